@@ -96,6 +96,10 @@ fn cost_and_accuracy_of_the_transform() {
         "structure-spectrum",
         "structure-search",
         "decimation-4000",
+        "tachometer-1-mark-1000-edges",
+        "tachometer-1-mark-most",
+        "tachometer-60-2-1000-edges",
+        "tachometer-60-2-most",
     ] {
         println!("{piece}: {}", counts[piece]);
     }

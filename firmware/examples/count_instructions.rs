@@ -11,16 +11,18 @@
 
 use core::hint::black_box;
 
-use cortex_m::peripheral::SYST;
-use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::singleton;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::{debug, hprintln};
+use counter::{Counter, fail};
 use quietcut_core::decimation::{Decimation, State};
 use quietcut_core::lobes::LobeTable;
-use quietcut_core::units::{Hertz, Rpm};
+use quietcut_core::tachometer::{Edge, Tachometer, TachometerState, Wheel};
+use quietcut_core::units::{Hertz, Nanoseconds, Rpm};
 use quietcut_core::{fft, math};
 
+#[path = "support/counter.rs"]
+mod counter;
 // The tests that compare the digests include these files too, with `pub` items.
 #[allow(unreachable_pub)]
 #[path = "../../tests/support/chain_bits.rs"]
@@ -37,7 +39,7 @@ fn main() -> ! {
     let mut counter = Counter::start(peripherals.SYST);
 
     let mut sum = 0_u32;
-    counter.print("loop-of-1000-additions", || {
+    print(&mut counter, "loop-of-1000-additions", || {
         for i in 0..1000_u32 {
             sum = black_box(sum.wrapping_add(i));
         }
@@ -47,11 +49,12 @@ fn main() -> ! {
     transforms(&mut counter);
     spectra(&mut counter);
     decimation(&mut counter);
+    tachometer(&mut counter);
     lobe_table(&mut counter);
-    counter.print("sqrt-1000", || {
+    print(&mut counter, "sqrt-1000", || {
         (1..=1000_u16).for_each(|x| keep(math::sqrt(black_box(f32::from(x)))))
     });
-    counter.print("libm-sqrt-1000", || {
+    print(&mut counter, "libm-sqrt-1000", || {
         (1..=1000_u16).for_each(|x| keep(libm::sqrtf(black_box(f32::from(x)))))
     });
     hprintln!("bits-of-math {}", chain_bits::of_math());
@@ -82,8 +85,10 @@ fn transforms(counter: &mut Counter) {
                 *float = *fixed as f32;
             }
             let (fixed, float) = (black_box(fixed), black_box(float));
-            counter.print(concat!("rfft-", $points), || keep($fixed(fixed)));
-            counter.print(concat!("microfft-", $points), || keep($float(float)));
+            print(counter, concat!("rfft-", $points), || keep($fixed(fixed)));
+            print(counter, concat!("microfft-", $points), || {
+                keep($float(float))
+            });
         };
     }
     both!(256, fft::rfft_256, microfft::real::rfft_256);
@@ -99,12 +104,14 @@ fn spectra(counter: &mut Counter) {
         fail()
     };
     hprintln!("bits-of-spectra {}", chain_bits::of_spectra(memory));
-    counter.print("tool-spectrum", || keep(memory.tool_spectrum()));
+    print(counter, "tool-spectrum", || keep(memory.tool_spectrum()));
     let spectrum = memory.tool_spectrum();
-    counter.print("tool-search", || keep(chain_bits::search(spectrum)));
-    counter.print("structure-spectrum", || keep(memory.structure_spectrum()));
+    print(counter, "tool-search", || keep(chain_bits::search(spectrum)));
+    print(counter, "structure-spectrum", || {
+        keep(memory.structure_spectrum())
+    });
     let spectrum = memory.structure_spectrum();
-    counter.print("structure-search", || keep(chain_bits::search(spectrum)));
+    print(counter, "structure-search", || keep(chain_bits::search(spectrum)));
 }
 
 /// Counts the decimation of 4000 sensor samples to both bands.
@@ -114,11 +121,39 @@ fn decimation(counter: &mut Counter) {
     };
     let mut state = State::new();
     let counts = black_box([1234, -567, 2048]);
-    counter.print("decimation-4000", || {
+    print(counter, "decimation-4000", || {
         for _ in 0..4000 {
             keep(decimation.step(&mut state, black_box(counts)));
         }
     });
+}
+
+/// Counts 1000 edges of a wheel at constant speed, and the most that one edge takes.
+fn tachometer(counter: &mut Counter) {
+    for (name, most, positions, missing) in [
+        ("tachometer-1-mark-1000-edges", "tachometer-1-mark-most", 1, 0),
+        ("tachometer-60-2-1000-edges", "tachometer-60-2-most", 60, 2),
+    ] {
+        let Some(tachometer) = Tachometer::new(Wheel { positions, missing }) else {
+            fail()
+        };
+        let mut state = TachometerState::new();
+        let mut time = 0;
+        let teeth = u64::from(positions - missing);
+        let mut edge = |edge: u64| {
+            let gap = u64::from(edge % teeth == 0) * u64::from(missing);
+            time += (1 + gap) * 100_000 + 37 * (edge % 5);
+            keep(tachometer.observe(
+                &mut state,
+                Edge {
+                    time: Nanoseconds(time),
+                },
+            ));
+        };
+        print(counter, name, || (0..1000).for_each(&mut edge));
+        let most_of_all = (1000..1200).map(|n| counter.count(|| edge(n))).max();
+        hprintln!("{} {}", most, most_of_all.unwrap_or(0));
+    }
 }
 
 /// Counts lookups and advice in a lobe table of 96 KB.
@@ -128,74 +163,27 @@ fn lobe_table(counter: &mut Counter) {
     };
     let Some(table) = memory.table() else { fail() };
     hprintln!("bits-of-table {}", table_bits::of_table(&table));
-    counter.print("table-parse", || keep(LobeTable::parse(black_box(table.bytes()))));
+    print(counter, "table-parse", || {
+        keep(LobeTable::parse(black_box(table.bytes())))
+    });
     let cut = table_bits::cut(1.1);
-    counter.print("table-lookup", || {
+    print(counter, "table-lookup", || {
         keep(table.lookup(black_box(Rpm(1000.5)), &cut))
     });
-    counter.print("advice-speed", || {
+    print(counter, "advice-speed", || {
         keep(table_bits::advice(&table, black_box(1000.0), 1.1))
     });
-    counter.print("advice-depth", || {
+    print(counter, "advice-depth", || {
         keep(table_bits::advice(&table, black_box(1000.0), 3.0))
     });
+}
+
+/// Prints the number of instructions of `piece`.
+fn print(counter: &mut Counter, name: &str, piece: impl FnOnce()) {
+    hprintln!("{} {}", name, counter.count(piece));
 }
 
 /// Keeps the compiler from removing the computation of an unused value.
 fn keep<T>(value: T) {
     black_box(value);
-}
-
-/// Counter of instructions, with the timer SysTick.
-struct Counter {
-    timer: SYST,
-    empty_ticks: u32,
-}
-
-impl Counter {
-    /// Largest count of SysTick, which has 24 bits: 10.4 million instructions.
-    const MAX_TICKS: u32 = 0x00ff_ffff;
-
-    fn start(mut timer: SYST) -> Self {
-        timer.set_clock_source(SystClkSource::Core);
-        timer.set_reload(Self::MAX_TICKS);
-        timer.clear_current();
-        timer.enable_counter();
-        let mut counter = Self {
-            timer,
-            empty_ticks: 0,
-        };
-        counter.empty_ticks = counter.ticks(|| ());
-        counter
-    }
-
-    fn ticks(&mut self, piece: impl FnOnce()) -> u32 {
-        self.timer.clear_current();
-        let before = SYST::get_current();
-        piece();
-        let after = SYST::get_current();
-        if self.timer.has_wrapped() {
-            fail()
-        }
-        before.wrapping_sub(after) & Self::MAX_TICKS
-    }
-
-    /// Prints the number of instructions of `piece`.
-    fn print(&mut self, name: &str, piece: impl FnOnce()) {
-        let ticks = self.ticks(piece).saturating_sub(self.empty_ticks);
-        // One instruction takes 1.6 ticks.
-        hprintln!("{} {}", name, (u64::from(ticks) * 5 + 4) / 8);
-    }
-}
-
-fn fail() -> ! {
-    loop {
-        debug::exit(debug::EXIT_FAILURE);
-    }
-}
-
-#[panic_handler]
-fn panic(info: &core::panic::PanicInfo) -> ! {
-    hprintln!("{}", info);
-    fail()
 }

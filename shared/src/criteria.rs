@@ -127,6 +127,12 @@ pub(crate) const DAMAGE_MAX: f32 = 0.05;
 /// Unfounded.
 pub(crate) const SPEED_CHANGE_MAX: f32 = 0.02;
 
+/// Time without a complete tooth period after which what the last ones told is out of date, in s and in tooth periods at the
+/// present speed, whichever is longer: a quarter of the second within which an alarm ends, and more than one missing tooth period.
+pub(crate) const STALE_S: f32 = 0.25;
+/// See [`STALE_S`].
+pub(crate) const STALE_TOOTH_PERIODS: f32 = 3.0;
+
 /// Relative change of the spindle speed after which advice is computed again: a fifth of [`SPEED_BAND`]. The share is
 /// unfounded.
 pub(crate) const ADVICE_SPEED_STEP: f32 = 0.002;

@@ -307,6 +307,7 @@ impl Decimation {
     }
 
     /// Decimates one sample of the sensor.
+    #[inline(never)]
     pub fn step(&self, state: &mut State, counts: Counts) -> Output {
         let mut tool = Some(counts.map(|c| i32::from(c) << FRACTION_BITS));
         for stage in state.medium.iter_mut().take(self.medium_halvings.into()) {

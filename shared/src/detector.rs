@@ -6,6 +6,7 @@ mod frequency;
 pub mod growth;
 pub mod judge;
 mod latched_chatter;
+pub mod lines;
 mod lone_tone;
 pub mod presence;
 pub mod tone;

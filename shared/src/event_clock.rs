@@ -89,6 +89,8 @@ impl EventClock {
     }
 
     /// Processes the time stamp of an event whose number is higher by `steps` than that of the event observed last.
+    // Several callers, and flash is scarce.
+    #[inline(never)]
     pub fn observe(&self, state: &mut EventClockState, steps: u32, stamp: Nanoseconds) -> Observation {
         let dn = steps as f32;
         let predicted_ns = state.time_ns.saturating_add((dn * state.period_ns) as u64);
@@ -214,6 +216,15 @@ impl EventClockState {
     /// Number of events from the newest one to the time `time`, by the fitted line; negative if `time` is earlier.
     pub fn events_to(&self, time: Nanoseconds) -> f32 {
         difference_ns(time.0, self.time_ns) / self.period_ns
+    }
+
+    /// Lets the line continue from the newest time stamp with this period, which counts as uncertain as one that is computed from two
+    /// time stamps.
+    pub fn steer(&mut self, period_ns: f32) {
+        self.time_ns = self.stamp_ns;
+        self.period_ns = period_ns;
+        self.covariance = [1.0, 0.0, 2.0];
+        (self.outliers, self.bias_ns, self.previous_ns) = (0, 0.0, 0.0);
     }
 
     /// Clamps the fitted period between events to the range from `least_ns` to `most_ns`.

@@ -311,6 +311,7 @@ static PASS_512: [[Complex; 3]; 512] = pass_factors();
 macro_rules! real_transform {
     ($name:ident, $points:literal, $($factors:ident),+) => {
         #[doc = concat!("Transform of ", stringify!($points), " real values in place.")]
+        #[inline(never)]
         pub fn $name(data: &mut [i32; $points]) -> Transform<'_> {
             const PASSES: i32 = [$($factors.len()),+].len() as i32;
             const BITS: i32 = 31 + PASSES - ($points as u32).trailing_zeros() as i32;

@@ -6,6 +6,7 @@
 mod angles;
 mod band;
 mod band_state;
+mod loudness;
 mod pipeline;
 mod report;
 mod settings;

@@ -1,4 +1,6 @@
 //! Tones in a power spectrum: frequency and amplitude by interpolation, noise floor, harmonics of the spindle.
+//!
+//! Both bands and several searches call the functions of this file. They are not inlined, because flash is scarce.
 
 use heapless::Vec;
 
@@ -94,6 +96,7 @@ impl PowerSpectrum<'_> {
     /// none.
     ///
     /// Other tones change it little while they cover much less than half of these bins.
+    #[inline(never)]
     pub fn noise_floor(&self, k: usize) -> f32 {
         let mut around = [0u32; 2 * FLOOR_HALF_WIDTH];
         let below = k.saturating_sub(FLOOR_HALF_WIDTH)..k.saturating_sub(LOBE_HALF_WIDTH);
@@ -112,6 +115,7 @@ impl PowerSpectrum<'_> {
     }
 
     /// Frequency, amplitude and signal-to-noise ratio of the tone whose highest bin is `k`.
+    #[inline(never)]
     fn peak(&self, k: usize) -> Peak {
         let (bins, mean_square) = self.interpolate(k);
         let floor = self.noise_floor(k).max(f32::MIN_POSITIVE);
@@ -124,6 +128,7 @@ impl PowerSpectrum<'_> {
 
     /// Bins of the local maxima of the spectrum between two frequencies, or in the next bin outside, strongest first,
     /// at most [`MAXIMA_SEARCHED`].
+    #[inline(never)]
     fn maxima(&self, from: Hertz, to: Hertz) -> Vec<usize, MAXIMA_SEARCHED> {
         let mut found: Vec<usize, MAXIMA_SEARCHED> = Vec::new();
         // The rounded mean of the samples was subtracted; its rounding error remains in bins 0 and 1, so these are
@@ -159,6 +164,7 @@ impl PowerSpectrum<'_> {
 
     /// The strongest tone of the spectrum between two frequencies, if its power is at least [`MIN_SNR`] times the noise
     /// floor.
+    #[inline(never)]
     pub fn dominant(&self, from: Hertz, to: Hertz) -> Option<Peak> {
         let strongest = *self.maxima(from, to).first()?;
         Some(self.peak(strongest)).filter(|peak| peak.snr >= MIN_SNR)
@@ -168,6 +174,7 @@ impl PowerSpectrum<'_> {
     ///
     /// A tone counts as harmonic n of the spindle if it lies within n·uncertainty plus one bin of it. A local maximum
     /// is skipped if it is explained by the window's side lobes of stronger maxima.
+    #[inline(never)]
     pub fn dominant_non_harmonic(&self, rotation: Rotation, from: Hertz, to: Hertz) -> Search {
         let Rotation {
             frequency,

@@ -104,6 +104,7 @@ pub struct PowerSpectrum<'a> {
 ///
 /// `sample_rate` is the fitted rate of the tool band, `unit` the acceleration in m/s² of one unit of a [`Sample`], and
 /// `work` scratch memory.
+#[inline(never)]
 pub fn tool_spectrum<'a>(
     block: &Overlap<TOOL_POINTS>,
     axes: &[usize],
@@ -129,6 +130,7 @@ pub fn tool_spectrum<'a>(
 }
 
 /// Power spectrum of the structure band; the arguments are those of [`tool_spectrum`].
+#[inline(never)]
 pub fn structure_spectrum<'a>(
     block: &Overlap<STRUCTURE_POINTS>,
     axes: &[usize],

@@ -96,6 +96,16 @@ impl Stroboscope {
         usize::from(self.classes)
     }
 
+    /// The passing a revolution before the next one; `None` where it is not known.
+    pub fn a_revolution_ago(&self) -> Option<ToothPassing> {
+        let turn = self.window(self.classes()).filter(|turn| turn.length() > 0)?;
+        let mut passing = *turn.row(0);
+        for (value, reference) in passing.iter_mut().zip(self.reference.get(turn.class(0))?) {
+            *value += reference;
+        }
+        Some(passing)
+    }
+
     /// Passings since the reset.
     pub fn since_reset(&self) -> u32 {
         self.since_reset

@@ -1,29 +1,36 @@
 //! Tachometer: level to edges, edges to spindle speed and phase.
+//!
+//! | part | does |
+//! |---|---|
+//! | [`LevelDetector`] | rising edges of a level |
+//! | `Train` | regular intervals among the newest pulses: starts a lock, and replaces one that the pulses contradict |
+//! | `Lock` | position of each edge on the wheel, place of the gap |
+//! | `RecentEdges` | pitch, speed and acceleration from whole revolutions |
+//! | [`EventClock`] | time and period of the positions at constant speed, with their uncertainty |
+//!
+//! The work per edge is fixed. An edge before the preceding one (a clock that jumped) starts everything anew.
 
 mod level;
+mod lock;
+mod recent_edges;
+mod train;
+mod wheel;
 
 pub use level::{LevelDetector, LevelDetectorState};
+pub use wheel::Wheel;
 
 use serde::{Deserialize, Serialize};
 
-use crate::event_clock::{EventClock, EventClockState};
+use crate::event_clock::EventClock;
 use crate::units::{Nanoseconds, Rpm};
+use lock::{JITTER_PITCHES, Lock, Outcome};
+use train::{FASTER_INTERVALS, Train, agreeing_intervals};
 
 /// A rising edge of the tachometer, on the device's clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Edge {
     /// When it came.
     pub time: Nanoseconds,
-}
-
-/// The wheel that makes the pulses: one mark, or a toothed wheel with a gap such as 60−2.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Wheel {
-    /// Positions on the wheel, at least 1.
-    pub positions: u16,
-    /// This many positions in a row are missing; the first edge after them is immersion angle 0 of tooth 1.
-    pub missing: u16,
 }
 
 /// An angle of the spindle since the tachometer locked: whole turns above, 2⁻³² turns below.
@@ -73,18 +80,10 @@ pub struct Tachometer {
     line: EventClock,
 }
 
-/// Edges remembered while the tachometer searches: enough for a median that one gap cannot move.
-const REMEMBERED: usize = 5;
-
 /// Where a [`Tachometer`] stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TachometerState {
-    /// Time of the newest edge, whatever it was.
-    newest: Option<Nanoseconds>,
-    /// The last intervals between edges, while searching.
-    intervals_ns: [f32; REMEMBERED],
-    /// How many of them are there.
-    remembered: u8,
+    train: Train,
     lock: Option<Lock>,
     /// Spindle speed over the last whole turn.
     turn_speed: Option<Rpm>,
@@ -100,44 +99,14 @@ pub struct TachometerState {
     losses: u32,
 }
 
-/// A wheel whose position is known.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Lock {
-    /// Events are the positions of the wheel, the missing ones included.
-    line: EventClockState,
-    /// Position of the newest accepted edge, 0 for the first after the gap.
-    position: u16,
-    /// Time of the newest accepted edge.
-    edge: Nanoseconds,
-    /// Usual time from one position to the next, in ns. Slower than the line, so that no few edges mislead it.
-    pitch_ns: f32,
-    /// Length of the gap in pitches, as this sensor sees it.
-    gap_pitches: f32,
-    /// Time of the newest edge at position 0.
-    mark: Option<Nanoseconds>,
-    /// Edges or gaps in a row that did not fit.
-    misfits: u8,
-}
-
 /// Angle of the edge at which the tachometer locked, in turns: so that angles before it are none below 0.
 const FIRST_TURN: u64 = 1024;
-/// Accepted edges lie within this many pitches of where they are expected. A wheel's teeth are off by
-/// much less; the teeth beside the gap of a variable-reluctance sensor by 0.4.
-const TOLERANCE_PITCHES: f32 = 0.45;
 /// So many misfits in a row and it is the lock that is wrong.
 const MISFITS_AT_MOST: u8 = 4;
-/// Intervals agree when they differ by less than this fraction.
-const AGREEMENT: f32 = 0.25;
 /// The tachometer is lost when no edge came for this many times the longest regular interval.
 const LOST_INTERVALS: f32 = 2.5;
-/// The usual pitch follows each interval by this part,
-const PITCH_FOLLOWS: f32 = 0.25;
-/// and believes a change of this fraction at most: beside a gap an interval is off by a quarter.
-const PITCH_MOVES: f32 = 0.2;
-/// The learnt length of the gap follows each gap by this part.
-const GAP_FOLLOWS: f32 = 0.25;
-/// Standard deviation of an edge expected before any was seen, in pitches.
-const JITTER_PITCHES: f32 = 0.001;
+/// Standard deviation of the pitch at the lock, as a part of it: alike intervals differ by up to a half.
+const PITCH_UNCERTAINTY: f32 = 0.25;
 /// Turns after which an edge weighs 1/e. Long against jitter, short against changes of speed.
 const MEMORY_TURNS: f32 = 4.0;
 /// With few positions the memory is at least this many edges.
@@ -146,19 +115,20 @@ const MEMORY_EDGES: f32 = 8.0;
 impl Tachometer {
     /// A tachometer with this wheel.
     ///
-    /// Returns `None` for a wheel without positions, and for one with less than two teeth beside its gap.
+    /// Returns `None` for a wheel without positions, and for one with less than four teeth beside its gap or a gap of 100 positions or
+    /// more.
     pub fn new(wheel: Wheel) -> Option<Self> {
         let whole = wheel.missing == 0 && wheel.positions >= 1;
         let gapped =
             wheel.missing > 0 && wheel.positions >= wheel.missing.saturating_add(4) && wheel.missing < 100;
         (whole || gapped).then(|| {
-            let edges = MEMORY_TURNS * f32::from(wheel.positions - wheel.missing);
+            let edges = MEMORY_TURNS * f32::from(wheel.teeth());
             let memory = if edges > MEMORY_EDGES { edges } else { MEMORY_EDGES };
             Self {
                 wheel,
                 line: EventClock {
                     memory,
-                    period_uncertainty: AGREEMENT / JITTER_PITCHES,
+                    period_uncertainty: PITCH_UNCERTAINTY / JITTER_PITCHES,
                 },
             }
         })
@@ -169,172 +139,109 @@ impl Tachometer {
         self.wheel
     }
 
-    fn teeth(&self) -> u16 {
-        self.wheel.positions - self.wheel.missing
-    }
-
     /// Takes the next edge. Edges come in the order of their time.
+    #[inline(never)]
     pub fn observe(&self, state: &mut TachometerState, edge: Edge) -> EdgeKind {
+        if state.train.is_after(edge.time) {
+            state.lose();
+        }
         self.expire(state, edge.time);
-        let kind = match &mut state.lock {
-            None => self.search(state, edge.time),
-            Some(_) => self.follow(state, edge.time),
+        let is_pulse = state.train.push(edge.time);
+        let Some(lock) = &mut state.lock else {
+            return self.search(state, edge.time, is_pulse);
         };
-        state.newest = Some(edge.time);
-        kind
+        let outcome = if is_pulse {
+            lock.observe(self.wheel, &self.line, edge.time)
+        } else {
+            Outcome::Rejected
+        };
+        if self.replace(state, edge.time) {
+            return EdgeKind::Accepted;
+        }
+        self.count(state, outcome)
     }
 
     /// Gives up the lock when no edge came for too long before `now`.
     pub fn expire(&self, state: &mut TachometerState, now: Nanoseconds) {
         let Some(lock) = &state.lock else { return };
         let longest = (f32::from(self.wheel.missing) + 1.0) * LOST_INTERVALS;
-        let waited_ns = now.seconds_since(lock.edge) * 1e9;
-        if waited_ns > longest * lock.pitch_ns {
+        let longest_ns = longest * lock.pitch_ns;
+        let is_late = |since: Nanoseconds| now.seconds_since(since) * 1e9 > longest_ns;
+        if state.train.newest().is_none_or(is_late) {
             state.lose();
+        } else if is_late(lock.edge) {
+            // Pulses still come: they are those of another speed.
+            state.lose_lock();
         }
     }
 
-    /// Looks for a steady train, and for the gap in it where the wheel has one.
-    fn search(&self, state: &mut TachometerState, time: Nanoseconds) -> EdgeKind {
-        let Some(newest) = state.newest else {
-            return EdgeKind::Searching;
-        };
-        let interval_ns = time.seconds_since(newest) * 1e9;
-        let known = usize::from(state.remembered).min(REMEMBERED);
-        let before = state.intervals_ns;
-        state.intervals_ns.rotate_right(1);
-        if let Some(first) = state.intervals_ns.first_mut() {
-            *first = interval_ns;
-        }
-        state.remembered = (known + 1).min(REMEMBERED) as u8;
-
-        let (pitch_ns, gap_pitches) = if self.wheel.missing == 0 {
-            let Some(pitch) = agreed(state.intervals_ns.get(..known + 1).unwrap_or(&[])) else {
-                return EdgeKind::Searching;
-            };
-            (pitch, 1.0)
+    /// Looks for regular intervals.
+    fn search(&self, state: &mut TachometerState, time: Nanoseconds, is_pulse: bool) -> EdgeKind {
+        state.lock = state
+            .train
+            .regular(self.wheel)
+            .filter(|_| is_pulse)
+            .and_then(|intervals| Lock::new(self.wheel, &self.line, time, intervals));
+        if state.lock.is_some() {
+            EdgeKind::Accepted
         } else {
-            if known < REMEMBERED {
-                return EdgeKind::Searching;
+            EdgeKind::Searching
+        }
+    }
+
+    /// Counts what became of an edge, and times the turn that it ends.
+    fn count(&self, state: &mut TachometerState, outcome: Outcome) -> EdgeKind {
+        let steps = match outcome {
+            Outcome::Rejected => {
+                state.rejected = state.rejected.saturating_add(1);
+                return EdgeKind::Rejected;
             }
-            let pitch = median(before);
-            let gap = interval_ns / pitch;
-            if !self.is_gap(gap) {
-                return EdgeKind::Searching;
+            Outcome::Accepted(steps) => steps,
+            Outcome::Resynchronized(steps) => {
+                (state.turn_speed, state.previous_turn_speed) = (None, None);
+                state.losses = state.losses.saturating_add(1);
+                steps
             }
-            (pitch, gap)
         };
-        state.lock = Some(Lock {
-            line: self.line.start(time, pitch_ns, JITTER_PITCHES * pitch_ns),
-            position: 0,
-            edge: time,
-            pitch_ns,
-            gap_pitches,
-            mark: Some(time),
-            misfits: 0,
-        });
-        state.remembered = 0;
+        state.missed = state.missed.saturating_add(u32::from(steps.missed));
+        if let Some((turns, seconds)) = state.lock.as_mut().and_then(|lock| lock.take_turns(self.wheel)) {
+            state.previous_turn_speed = state.turn_speed;
+            state.turn_speed = Some(Rpm(60.0 * turns as f32 / seconds));
+            state.turns = state.turns.saturating_add(turns);
+        }
         EdgeKind::Accepted
     }
 
-    /// True where an interval of this many pitches is the gap. Beside the gap a variable-reluctance
-    /// sensor moves its edges by up to ¾ pitch.
-    fn is_gap(&self, pitches: f32) -> bool {
-        let missing = f32::from(self.wheel.missing);
-        pitches > 1.0 + 0.6 * missing && pitches < 1.0 + 1.6 * missing
-    }
-
-    /// Goes on with the next edge of a locked wheel.
-    fn follow(&self, state: &mut TachometerState, time: Nanoseconds) -> EdgeKind {
+    /// Replaces or gives up a lock that the newest pulses contradict. True where it is replaced.
+    fn replace(&self, state: &mut TachometerState, time: Nanoseconds) -> bool {
         let Some(lock) = &mut state.lock else {
-            return EdgeKind::Searching;
+            return false;
         };
-        let pitches = time.seconds_since(lock.edge) * 1e9 / lock.pitch_ns;
-        let Some(steps) = self.steps(lock, pitches) else {
-            state.rejected = state.rejected.saturating_add(1);
-            lock.misfits += 1;
-            if lock.misfits >= MISFITS_AT_MOST {
-                state.lose();
-            }
-            return EdgeKind::Rejected;
-        };
-        if steps.positions == self.wheel.missing + 1 && steps.missed == 0 {
-            lock.gap_pitches += GAP_FOLLOWS * (pitches - lock.gap_pitches);
-        }
-        let over_gap = steps.positions > steps.missed + 1;
-        if !over_gap {
-            let ratio = pitches / f32::from(steps.positions);
-            lock.pitch_ns *= 1.0 + PITCH_FOLLOWS * (ratio - 1.0).clamp(-PITCH_MOVES, PITCH_MOVES);
-        }
-        let passed = lock.position.saturating_add(steps.positions);
-        let turned = passed >= self.wheel.positions;
-        lock.position = passed % self.wheel.positions;
-        state.missed = state.missed.saturating_add(u32::from(steps.missed));
-        lock.misfits = if steps.missed == 0 { 0 } else { lock.misfits + 1 };
-        self.line
-            .observe(&mut lock.line, u32::from(steps.positions), time);
-        lock.edge = time;
-        if turned {
-            let mark = (lock.position == 0).then_some(time);
-            if let (Some(last), Some(mark)) = (lock.mark, mark) {
-                state.previous_turn_speed = state.turn_speed;
-                state.turn_speed = Some(Rpm(60.0 / mark.seconds_since(last)));
-                state.turns = state.turns.saturating_add(1);
-            }
-            lock.mark = mark;
+        let pitch_ns = 1.0 / lock.speed(self.wheel);
+        // One mark that comes twice or half as often: two intervals may also come of one pulse too many, or of two missing ones.
+        let doubtful = lock.misfits >= 2 || state.train.is_faster(FASTER_INTERVALS - 1, pitch_ns);
+        lock.is_doubtful = self.wheel.positions == 1 && doubtful;
+        let unfit = lock.is_unfit(agreeing_intervals(self.wheel));
+        let regular = state.train.regular(self.wheel).filter(|_| unfit);
+        let other = regular.or_else(|| state.train.contradiction(self.wheel, pitch_ns));
+        if let Some(intervals) = other {
+            let lock = Lock::new(self.wheel, &self.line, time, intervals);
+            state.lose_lock();
+            state.lock = lock;
+            return true;
         }
         if lock.misfits >= MISFITS_AT_MOST {
-            state.lose();
+            state.lose_lock();
         }
-        EdgeKind::Accepted
+        false
     }
-
-    /// How far the wheel went in an interval of this many pitches; `None` where no tooth can be.
-    fn steps(&self, lock: &Lock, pitches: f32) -> Option<Steps> {
-        // Over the gap one step is as long as this sensor sees it.
-        let last = lock.position + 1 == self.teeth();
-        let (start, stretch) = if self.wheel.missing > 0 && last {
-            (self.wheel.missing, lock.gap_pitches - 1.0)
-        } else {
-            (0, 0.0)
-        };
-        let whole = (pitches - stretch + 0.5) as u16;
-        let off = pitches - stretch - f32::from(whole);
-        if whole == 0 || !(-TOLERANCE_PITCHES..=TOLERANCE_PITCHES).contains(&off) {
-            return None;
-        }
-        let passed = lock.position.saturating_add(start).saturating_add(whole);
-        if self.wheel.missing > 0 && passed >= self.teeth() {
-            // Over the gap: only positions that carry a tooth can make an edge.
-            if passed < self.wheel.positions {
-                return None;
-            }
-            let missed = whole - 1 - (self.wheel.missing - start);
-            return Some(Steps {
-                positions: start + whole,
-                missed,
-            });
-        }
-        Some(Steps {
-            positions: whole,
-            missed: whole - 1,
-        })
-    }
-}
-
-/// How far the wheel went between two edges.
-struct Steps {
-    positions: u16,
-    missed: u16,
 }
 
 impl TachometerState {
     /// Before the first edge.
     pub const fn new() -> Self {
         Self {
-            newest: None,
-            intervals_ns: [0.0; REMEMBERED],
-            remembered: 0,
+            train: Train::new(),
             lock: None,
             turn_speed: None,
             previous_turn_speed: None,
@@ -345,9 +252,16 @@ impl TachometerState {
         }
     }
 
+    /// Forgets lock and pulses: those before a stop say nothing of those after it.
     fn lose(&mut self) {
+        self.train = Train::new();
+        if self.lock.is_some() {
+            self.lose_lock();
+        }
+    }
+
+    fn lose_lock(&mut self) {
         self.lock = None;
-        self.remembered = 0;
         self.turn_speed = None;
         self.previous_turn_speed = None;
         self.losses = self.losses.saturating_add(1);
@@ -355,39 +269,32 @@ impl TachometerState {
 }
 
 impl Tachometer {
-    /// Spindle phase as a line about `time`; `None` while the tachometer searches or is lost.
+    /// Spindle phase as a line about `time`; `None` while the tachometer searches or is lost, and before the gap of the wheel has passed.
     pub fn phase(&self, state: &TachometerState, time: Nanoseconds) -> Option<Phase> {
-        let lock = state.lock.as_ref()?;
-        if lock.line.observations() < 2 {
-            return None;
-        }
-        let positions = f32::from(self.wheel.positions);
-        let events = lock.line.events_to(time);
-        let turns = u64::from(self.wheel.positions);
-        let index = lock.line.index();
-        let whole = (index / turns + FIRST_TURN) << 32;
-        let part = ((index % turns) << 32) / turns;
-        let beyond = events / positions * 4_294_967_296.0;
+        let lock = state.lock.as_ref().filter(|lock| !lock.is_doubtful)?;
+        let (turns, positions, positions_per_ns) = lock.angle(self.wheel, time)?;
+        let all = f32::from(self.wheel.positions);
+        let whole = (turns + FIRST_TURN) << 32;
+        let beyond = positions / all * 4_294_967_296.0;
         let angle = if beyond >= 0.0 {
-            (whole + part).wrapping_add(beyond as u64)
+            whole.wrapping_add(beyond as u64)
         } else {
-            (whole + part).saturating_sub((-beyond) as u64)
+            whole.saturating_sub((-beyond) as u64)
         };
-        let per_second = 1e9 / (lock.line.period_ns() * positions);
-        let deviation_ns = crate::math::sqrt(lock.line.variance_at_ns2(events));
+        let turns_per_second = positions_per_ns * 1e9 / all;
         Some(Phase {
             time,
             angle: Turns(angle),
-            turns_per_second: per_second,
-            deviation_turns: deviation_ns * 1e-9 * per_second,
+            turns_per_second,
+            deviation_turns: lock.deviation_ns(time) * 1e-9 * turns_per_second,
         })
     }
 
-    /// Spindle speed now; `None` while the tachometer searches or is lost.
+    /// Spindle speed at the newest edge; `None` while the tachometer searches or is lost, and while the newest pulses contradict it.
     pub fn speed(&self, state: &TachometerState) -> Option<Rpm> {
-        let lock = state.lock.as_ref().filter(|lock| lock.line.observations() >= 2)?;
+        let lock = state.lock.as_ref().filter(|lock| !lock.is_doubtful)?;
         Some(Rpm(
-            60e9 / (lock.line.period_ns() * f32::from(self.wheel.positions))
+            60e9 * lock.speed(self.wheel) / f32::from(self.wheel.positions)
         ))
     }
 }
@@ -425,17 +332,4 @@ impl TachometerState {
     pub fn losses(&self) -> u32 {
         self.losses
     }
-}
-
-/// The newest interval, where the newest two agree.
-fn agreed(intervals_ns: &[f32]) -> Option<f32> {
-    let (new, old) = (*intervals_ns.first()?, *intervals_ns.get(1)?);
-    let difference = if new > old { new - old } else { old - new };
-    (difference < AGREEMENT * new).then_some(new)
-}
-
-/// The middle one of five.
-fn median(mut values: [f32; REMEMBERED]) -> f32 {
-    values.sort_unstable_by(f32::total_cmp);
-    values.get(REMEMBERED / 2).copied().unwrap_or(0.0)
 }

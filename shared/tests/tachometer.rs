@@ -158,6 +158,65 @@ fn a_stopped_spindle_loses_the_lock_and_regains_it() {
 }
 
 #[test]
+fn a_missed_pulse_of_one_mark_does_not_halve_the_speed() {
+    let tachometer = Tachometer::new(ONE_MARK).unwrap();
+    let mut state = TachometerState::default();
+    for (n, time) in even_edges(ONE_MARK, 50.0, 40).into_iter().enumerate() {
+        if n % 7 == 6 {
+            continue;
+        }
+        tachometer.observe(&mut state, at(time));
+        if n > 3 {
+            let speed = tachometer.speed(&state).unwrap().0;
+            let turn = state.turn_speed().unwrap().0;
+            assert!((speed - 3000.0).abs() < 1.0, "speed {speed} at pulse {n}");
+            assert!((turn - 3000.0).abs() < 1.0, "turn {turn} at pulse {n}");
+        }
+    }
+    // The lock needs three pulses.
+    assert_eq!((state.turns(), state.losses()), (37, 0));
+}
+
+#[test]
+fn twice_as_many_pulses_are_twice_the_speed() {
+    let tachometer = Tachometer::new(ONE_MARK).unwrap();
+    let mut state = TachometerState::default();
+    let mut time = 0.1;
+    for interval in [0.1; 20].into_iter().chain([0.05; 4]) {
+        time += interval;
+        tachometer.observe(&mut state, at(time));
+    }
+    assert!((tachometer.speed(&state).unwrap().0 - 1200.0).abs() < 1.0);
+}
+
+#[test]
+fn intervals_without_order_do_not_end_the_search() {
+    let tachometer = Tachometer::new(ONE_MARK).unwrap();
+    let mut state = TachometerState::default();
+    // A stop, pulses of a mark that swings before the sensor, and a new run-up.
+    let mut time = 0.1;
+    for interval in [0.01, 0.03, 0.2, 0.04, 0.5, 0.09, 0.3]
+        .into_iter()
+        .chain([0.02; 5])
+    {
+        time += interval;
+        tachometer.observe(&mut state, at(time));
+    }
+    assert!((tachometer.speed(&state).unwrap().0 - 3000.0).abs() < 1.0);
+}
+
+#[test]
+fn the_speed_is_known_before_the_gap_passes() {
+    let tachometer = Tachometer::new(SIXTY_LESS_TWO).unwrap();
+    let mut state = TachometerState::default();
+    for time in even_edges(SIXTY_LESS_TWO, 20.0, 1).into_iter().take(6) {
+        tachometer.observe(&mut state, at(time));
+    }
+    assert!((tachometer.speed(&state).unwrap().0 - 1200.0).abs() < 1.0);
+    assert!(tachometer.phase(&state, at(0.11).time).is_none());
+}
+
+#[test]
 fn speed_follows_a_ramp() {
     let tachometer = Tachometer::new(ONE_MARK).unwrap();
     let mut state = TachometerState::default();

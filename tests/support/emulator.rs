@@ -354,7 +354,20 @@ impl SocketPort {
 
 /// Runs the image that counts instructions until it ends. Returns the printed counts by name.
 pub fn count_instructions() -> BTreeMap<String, u64> {
-    let mut command = qemu(&firmware_image::count_instructions());
+    let printed = printed_counts(&firmware_image::count_instructions(), PATIENCE);
+    let count = |line: &str| -> Option<(String, u64)> {
+        let (name, count) = line.rsplit_once(' ')?;
+        Some((name.to_owned(), count.parse().ok()?))
+    };
+    printed
+        .lines()
+        .map(|line| count(line).unwrap_or_else(|| panic!("not a count: {line}")))
+        .collect()
+}
+
+/// Runs an image that counts until it ends, within `patience`. Returns what it printed.
+pub fn printed_counts(image: &Path, patience: Duration) -> String {
+    let mut command = qemu(image);
     command
         .args(["-M", "mps2-an386", "-serial", "null"])
         .args(COUNTING)
@@ -364,10 +377,10 @@ pub fn count_instructions() -> BTreeMap<String, u64> {
     let status = loop {
         match process.try_wait().expect("the emulator's state") {
             Some(status) => break status,
-            None if began.elapsed() > PATIENCE => {
+            None if began.elapsed() > patience => {
                 let _ = process.kill();
                 let _ = process.wait();
-                panic!("the counting image did not end within {PATIENCE:?}");
+                panic!("{} did not end within {patience:?}", image.display());
             }
             None => std::thread::sleep(Duration::from_millis(5)),
         }
@@ -379,14 +392,7 @@ pub fn count_instructions() -> BTreeMap<String, u64> {
             .expect("what the image printed");
     }
     assert!(status.success(), "the counting image failed: {status}\n{printed}");
-    let count = |line: &str| -> Option<(String, u64)> {
-        let (name, count) = line.rsplit_once(' ')?;
-        Some((name.to_owned(), count.parse().ok()?))
-    };
     printed
-        .lines()
-        .map(|line| count(line).unwrap_or_else(|| panic!("not a count: {line}")))
-        .collect()
 }
 
 /// Options of QEMU for every image: no window, semihosting, and the image itself behind the last one.

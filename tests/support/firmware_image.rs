@@ -20,6 +20,11 @@ pub fn count_instructions() -> PathBuf {
     image("examples/count_instructions")
 }
 
+/// The image that counts the instructions of the signal chain for each block.
+pub fn count_blocks() -> PathBuf {
+    image("examples/count_blocks")
+}
+
 /// Size in bytes of the stack of the real board.
 pub fn nucleo_stack_bytes() -> usize {
     let bytes = fs::read(nucleo_g474re()).expect("the image");

@@ -103,13 +103,13 @@ pub use conclusion::lobes;
 pub use conclusion::missing_force::{AtAmplitude, MissingForce};
 pub use conclusion::recorded_cuts::recorded_cuts;
 pub use conclusion::residual_views::{ResidualView, SpindleMotionView};
+pub use conclusion::updates::{BaselineUpdate, Posterior};
 pub use error::{DiagnoseError, FittingInput};
 pub use progress::{Options, Stage};
 
 use conclusion::{conclude, long_records};
 use quietcut_model::case::Case;
 use quietcut_recording::{Recording, TestKind};
-use records::study::Study;
 use records::{checks, full_engagement};
 
 /// Finds what the case gets wrong about the recordings, and why.
@@ -154,8 +154,7 @@ pub fn diagnose_watched(
         Some(diagnosis) => diagnosis,
         None => {
             watch(Stage::Records);
-            let study = Study::new(case, &recordings)?;
-            conclude::conclude(&study, &recordings, options, watch)
+            conclude::of_records(case, &recordings, options, watch)?
         }
     };
     diagnosis.warnings.extend(remark);

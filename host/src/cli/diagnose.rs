@@ -159,6 +159,10 @@ fn text(diagnosis: &Diagnosis) -> String {
                 diagnosis.alternatives()
             )
         }
+        Outcome::Update => {
+            "the case agrees with the recordings within the noise, with other values within its uncertainty"
+                .into()
+        }
         Outcome::Unexplained => "the case is wrong, and no known cause explains the residual".into(),
     });
     for cause in &diagnosis.causes {
@@ -179,6 +183,15 @@ fn text(diagnosis: &Diagnosis) -> String {
                 significant(high, 6)
             ));
         }
+    }
+    if !diagnosis.updates.is_empty() {
+        lines.push("what the recordings say of uncertain parameters:".into());
+        lines.extend(
+            diagnosis
+                .updates
+                .iter()
+                .map(|update| format!("  {}", update.sentence())),
+        );
     }
     if let (Some(extended), Some(gain)) = (diagnosis.extended, diagnosis.gain) {
         lines.push(format!(

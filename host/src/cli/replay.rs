@@ -94,6 +94,13 @@ pub fn run(args: Args) -> Result<(), Error> {
             args.recording.display()
         );
     }
+    if sensed.settings.wheel.is_none() {
+        tracing::warn!(
+            "{}: no tachometer; the verdicts come from spectra, which do not show slow growth, nor period doubling of an even number of teeth \
+             beside runout",
+            args.recording.display()
+        );
+    }
     let table = args.table.as_deref().map(crate::file::read).transpose()?;
     let mut log = match &args.port {
         Some(port) => on_device(&args, port, &sensed, table.as_deref())?,

@@ -91,12 +91,13 @@ pub struct VerdictLog {
 /// advice.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Summary {
-    /// Main verdict of a sequence of reports: the first kind of chatter that was detected; without chatter the last
-    /// verdict. `None` without any report.
+    /// Last verdict of a sequence of reports. `None` without any report.
     pub verdict: Option<&'static str>,
-    /// Time of the report since which the main verdict holds, s, on the clock of the samples: for chatter the first
-    /// report of chatter, otherwise the first after the last change of the verdict.
+    /// Time of the report since which the last verdict holds, s, on the clock of the samples.
     pub since_s: Option<f64>,
+    /// Chatter that was detected; `None` if there was none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chatter: Option<ChatterSummary>,
     /// Number of evaluated blocks.
     pub blocks: u64,
     /// Number of clipped acceleration samples since the signal chain was started or reset.
@@ -109,8 +110,17 @@ pub struct Summary {
     pub assumes_every_speed: bool,
     #[serde(skip)]
     lost: u32,
-    #[serde(skip)]
-    has_chatter: bool,
+}
+
+/// Chatter in a sequence of reports.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ChatterSummary {
+    /// First kind of chatter, see [`words::verdict_key`].
+    pub verdict: &'static str,
+    /// Time of the first report of chatter, s, on the clock of the samples.
+    pub from_s: f64,
+    /// Time of the last report of chatter, s, on the clock of the samples.
+    pub to_s: f64,
 }
 
 impl fmt::Display for Summary {
@@ -118,6 +128,14 @@ impl fmt::Display for Summary {
         match (self.verdict, self.since_s) {
             (Some(verdict), Some(since)) => write!(f, "{verdict} since {since:.2} s")?,
             _ => write!(f, "no verdict")?,
+        }
+        if let Some(ChatterSummary {
+            verdict,
+            from_s,
+            to_s,
+        }) = &self.chatter
+        {
+            write!(f, "; chatter ({verdict}) from {from_s:.2} to {to_s:.2} s")?;
         }
         write!(
             f,
@@ -154,10 +172,17 @@ impl VerdictLog {
         summary.clipped = report.clipped;
         summary.gaps += u32::from(report.lost > summary.lost);
         summary.lost = report.lost;
-        if !summary.has_chatter && summary.verdict != Some(next.verdict) {
-            summary.has_chatter = report.judgement.verdict.is_chatter();
+        if summary.verdict != Some(next.verdict) {
             summary.verdict = Some(next.verdict);
             summary.since_s = Some(next.t_s);
+        }
+        if report.judgement.verdict.is_chatter() {
+            let chatter = summary.chatter.get_or_insert(ChatterSummary {
+                verdict: next.verdict,
+                from_s: next.t_s,
+                to_s: next.t_s,
+            });
+            chatter.to_s = next.t_s;
         }
         let is_new = self.verdicts.last().is_none_or(|last| {
             last.verdict != next.verdict || !is_same_advice(last.advice.as_ref(), next.advice.as_ref())
@@ -223,9 +248,33 @@ mod tests {
         assert!(log.take(&report(400, Verdict::Hopf, 9)).is_none());
         assert_eq!(
             serde_json::to_value(&log.summary).unwrap(),
-            serde_json::json!({"verdict": "hopf", "since_s": 0.3, "blocks": 4, "clipped": 3, "gaps": 2})
+            serde_json::json!({
+                "verdict": "hopf", "since_s": 0.3, "chatter": {"verdict": "hopf", "from_s": 0.3, "to_s": 0.4},
+                "blocks": 4, "clipped": 3, "gaps": 2
+            })
         );
         assert_eq!(log.verdicts.len(), 2);
+    }
+
+    #[test]
+    fn a_recording_that_ended_in_air_is_not_summed_up_as_chatter() {
+        let mut log = VerdictLog::default();
+        for (t_ms, verdict) in [
+            (100, Verdict::Stable),
+            (200, Verdict::Hopf),
+            (300, Verdict::Hopf),
+            (400, Verdict::AirCut),
+        ] {
+            log.take(&report(t_ms, verdict, 0));
+        }
+        assert_eq!(
+            (log.summary.verdict, log.summary.since_s),
+            (Some("air-cut"), Some(0.4))
+        );
+        assert_eq!(
+            log.summary.to_string(),
+            "air-cut since 0.40 s; chatter (hopf) from 0.20 to 0.30 s; 4 blocks, 3 clipped samples, 0 gaps"
+        );
     }
 
     #[test]

@@ -33,6 +33,10 @@ pub fn diagnosis_page(
             h2 { @if diagnosis.outcome == Outcome::Confounded { "Candidate models that fit equally well" } @else { "Cause" } }
             @for cause in &diagnosis.causes { (cause_table(cause)) }
         }
+        @if !diagnosis.updates.is_empty() {
+            h2 { "What the records say of uncertain parameters" }
+            ul { @for update in &diagnosis.updates { li { (update.sentence()) } } }
+        }
         @if let Some(lobes) = &diagnosis.lobes {
             h2 { "Change of the stability lobes" }
             (section(lobes)?)
@@ -82,6 +86,9 @@ fn verdict(case_name: &str, diagnosis: &Diagnosis) -> Markup {
             },
             Outcome::Confounded => {
                 "is wrong; these candidate models fit equally well: " span.chatter { (diagnosis.alternatives()) } "."
+            },
+            Outcome::Update => {
+                span.quiet { "agrees with the recordings" } " within the noise, with other values within its uncertainty."
             },
             Outcome::Unexplained => {
                 "is wrong in a way that " span.chatter { "no known cause explains" } "."

@@ -1,6 +1,7 @@
 //! What one step of the pipeline knows.
 
 use crate::detector::finding::Finding;
+use crate::detector::lines::Lines;
 use crate::detector::tone::Tone;
 use crate::spectrum::PowerSpectrum;
 use crate::units::Hertz;
@@ -13,13 +14,17 @@ pub const BANDS: usize = 2;
 pub struct Evidence<'a> {
     /// Revolutions per second; `None` where no one knows.
     pub speed: Option<Hertz>,
+    /// Time since the step before, s.
+    pub seconds: f32,
+    /// Root mean square of the samples of each band about their mean, in any unit that stays.
+    pub loudness: [f32; BANDS],
     /// The speed is moving too fast for the passings to be compared.
     pub changing: bool,
     /// Too many samples are clipped or lost.
     pub damaged: bool,
     /// Number of teeth.
     pub teeth: u8,
-    /// Findings of structure and tool band; `None` where the band cannot be sampled at fixed angles.
+    /// Findings of structure and tool band; `None` where the band is not sampled at fixed angles.
     pub findings: [Option<&'a Finding>; BANDS],
     /// New passings since the step before.
     pub new_passings: [bool; BANDS],
@@ -27,10 +32,10 @@ pub struct Evidence<'a> {
     pub floors: [f32; BANDS],
     /// The newest spectra.
     pub spectra: [Option<PowerSpectrum<'a>>; BANDS],
+    /// The lines of the spindle in these spectra; `None` where its speed is measured or not known.
+    pub lines: [Option<&'a Lines>; BANDS],
     /// The tones that stand out of the background.
     pub tones: [Option<&'a Tone>; BANDS],
-    /// A spectrum has a background to stand out of.
-    pub heard: bool,
     /// New spectra since the step before.
     pub new_spectra: [bool; BANDS],
 }

@@ -92,6 +92,11 @@ impl Growth {
         &self.finding
     }
 
+    /// The passing a revolution before the next one, of the same tooth; `None` where it is not known.
+    pub fn a_revolution_ago(&self) -> Option<ToothPassing> {
+        self.stroboscope.a_revolution_ago()
+    }
+
     /// Takes a passing. `noise` is the mean square of white noise in one channel, in (m/s²)².
     /// True where the conditions have changed with this passing.
     pub fn push(

@@ -6,26 +6,28 @@
 //! | part | says |
 //! |---|---|
 //! | [`Finding`] of a band | multiplier, levels of forced part, runout and residual |
-//! | [`Tone`](crate::detector::tone::Tone) of a band | a new tone beside the harmonics, and its frequency |
+//! | [`Tone`] of a band | a new tone beside the harmonics, and its frequency |
 //! | [`Presence`] | whether anything is cut, against the quietest the machine has been |
 
 use crate::detector::evidence::{BANDS, Evidence};
 use crate::detector::finding::{Finding, Multiplier};
 use crate::detector::latched_chatter::{LatchedChatter, confidence};
+use crate::detector::lines::LOUD;
 use crate::detector::lone_tone::tone_alone;
 use crate::detector::presence::Presence;
+use crate::detector::tone::Tone;
 use crate::detector::{Judgement, Reason, Verdict};
 
 /// What grows must stand out of what the idle machine does by this factor.
 const OVER_IDLE: f32 = 3.0;
 /// What persists must be this part of the forced vibration at least to be called chatter.
 const PERSISTENT_SHARE: f32 = 0.7;
-/// Forced vibration of more than this, root mean square over a tooth period, is worth a word, in m/s².
-const LOUD: f32 = 30.0;
 /// Runout of more than this part of the forced vibration is worth a word.
 const RUNOUT_SHARE: f32 = 1.0;
 /// A residual leaks into the means of a few turns: less runout than this many times the residual is none.
 const RUNOUT_OVER_RESIDUAL: f32 = 1.5;
+/// Time for which a verdict holds at least, s: a machinist reads it, and what changes faster is no state of the cut.
+const STEADY_S: f32 = 1.0;
 /// Passings until a cut is judged stable without anything that could be seen dying.
 const SETTLED: u32 = 24;
 
@@ -39,6 +41,8 @@ pub struct Detector {
     /// The alternating part was seen dying, or standing, since the tool entered.
     runout_seen: bool,
     judgement: Judgement,
+    /// Time since the verdict changed, s.
+    since_change_s: f32,
 }
 
 impl Default for Detector {
@@ -64,6 +68,7 @@ impl Detector {
             cut_passings: 0,
             runout_seen: false,
             judgement: UNKNOWN,
+            since_change_s: f32::INFINITY,
         }
     }
 
@@ -83,16 +88,18 @@ impl Detector {
         self.cut_passings = 0;
         self.runout_seen = false;
         self.judgement = UNKNOWN;
+        self.since_change_s = f32::INFINITY;
     }
 
     /// Takes what is known now.
     pub fn step(&mut self, evidence: &Evidence<'_>) -> Judgement {
         for band in 0..BANDS {
+            self.presence[band].wait(evidence.seconds);
             if let Some(finding) = evidence.findings[band]
                 && evidence.new_passings[band]
                 && finding.is_valid(evidence.teeth)
             {
-                self.presence[band].update(finding);
+                self.presence[band].update(finding, evidence.speed, evidence.floors[band]);
             }
         }
         let air = self.is_air(evidence);
@@ -110,11 +117,30 @@ impl Detector {
         if air != Some(true) && !evidence.changing {
             self.catch(evidence);
         }
-        self.judgement = match &self.held {
+        let next = match &self.held {
             Some(held) => held.judgement(),
             None => self.judge(evidence, air),
         };
+        self.change(next, evidence.seconds);
         self.judgement
+    }
+
+    /// Changes the verdict at most once in [`STEADY_S`], but for the onset of an alarm, which is never late, and before the first decision.
+    fn change(&mut self, next: Judgement, seconds: f32) {
+        self.since_change_s += seconds;
+        let now = &self.judgement;
+        let is_onset = next.verdict.is_chatter() && !now.verdict.is_chatter();
+        let was_undecided = now.verdict == Verdict::Indeterminate;
+        let is_undecided = next.verdict == Verdict::Indeterminate;
+        let is_same = next.verdict == now.verdict && (!is_undecided || next.reason == now.reason);
+        // A speed that has become known leaves no reason to wait.
+        let is_refuted = now.reason == Reason::SpeedUnknown && next.reason != Reason::SpeedUnknown;
+        if is_same || is_onset || is_refuted || self.since_change_s >= STEADY_S {
+            if !(is_same || was_undecided && is_undecided) {
+                self.since_change_s = 0.0;
+            }
+            self.judgement = next;
+        }
     }
 
     /// True where nothing is cut, `None` where no band can tell yet.
@@ -124,7 +150,7 @@ impl Detector {
             if let Some(finding) = evidence.findings[band]
                 && finding.is_valid(evidence.teeth)
             {
-                let quiet = self.presence[band].is_air(finding, evidence.floors[band]);
+                let quiet = self.presence[band].is_air(finding, evidence.speed, evidence.floors[band]);
                 // A cut is heard in one band at least.
                 air = Some(air.unwrap_or(true) && quiet);
             }
@@ -160,7 +186,7 @@ impl Detector {
         finding: &Finding,
         evidence: &Evidence<'_>,
     ) -> Option<(Multiplier, Reason)> {
-        let idle = OVER_IDLE * self.presence[band].idle(evidence.floors[band]);
+        let idle = OVER_IDLE * self.presence[band].idle(evidence.speed, evidence.floors[band]);
         if let Some(growing) = finding.growing {
             return (growing.level > idle).then_some((growing, Reason::Growing));
         }
@@ -190,13 +216,7 @@ impl Detector {
             return unknown(Reason::SpeedChanging);
         }
         let Some(air) = air else {
-            // Without samples at fixed angles the spectrum alone speaks, and it has nothing to say.
-            let by_spectrum = evidence.findings.iter().all(Option::is_none) && evidence.heard;
-            return unknown(if by_spectrum {
-                Reason::NoSignal
-            } else {
-                Reason::TooShort
-            });
+            return judge_lines(evidence).unwrap_or(UNKNOWN);
         };
         if air {
             self.runout_seen = false;
@@ -262,4 +282,36 @@ impl Detector {
         }
         judgement
     }
+}
+
+/// The verdict of the spectra alone, where there is no chatter; `None` before the first, and while the tool is sampled at fixed angles. They do not
+/// show slow growth, nor a period doubling of an even number of teeth beside runout: hence the confidence of one half.
+fn judge_lines(evidence: &Evidence<'_>) -> Option<Judgement> {
+    if !evidence.findings.iter().all(Option::is_none) {
+        return None;
+    }
+    let mut lines = evidence.lines.iter().copied().flatten().peekable();
+    lines.peek()?;
+    let (mut has_teeth, mut lasts, mut synchronous) = (false, false, 0.0);
+    for lines in lines {
+        has_teeth |= lines.has_teeth;
+        lasts |= lines.dominant().is_some_and(Tone::lasts);
+        synchronous += lines.synchronous;
+    }
+    let (verdict, reason, confidence) = if !has_teeth {
+        (Verdict::AirCut, Reason::NoSignal, 0.5)
+    } else if lasts {
+        (Verdict::Indeterminate, Reason::Persistent, 0.0)
+    } else if synchronous > LOUD * LOUD {
+        (Verdict::Forced, Reason::NoSignal, 0.5)
+    } else {
+        (Verdict::Stable, Reason::NoSignal, 0.5)
+    };
+    Some(Judgement {
+        verdict,
+        reason,
+        chatter: None,
+        multiplier_abs: None,
+        confidence,
+    })
 }

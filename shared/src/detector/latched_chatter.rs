@@ -10,8 +10,11 @@ use crate::units::Hertz;
 
 /// It ends when its level falls below this part of the largest it had,
 const RELEASE: f32 = 0.4;
-/// for so many passings or spectra.
+/// for so many passings or spectra,
 const RELEASE_PASSINGS: u8 = 6;
+/// or for this time, in s, and at least two of them. The alarm then ends within the second after the vibration, the time of averaging included.
+const RELEASE_S: f32 = 0.5;
+const RELEASE_PASSINGS_LEAST: u8 = 2;
 /// Growth seen within so many passings or spectra is growth still.
 pub(super) const LAST_GROWTH: u8 = 16;
 /// An angle within this of the held one, in turns, is the same multiplier.
@@ -32,8 +35,13 @@ pub(super) struct LatchedChatter {
     pub(super) largest: f32,
     /// Passings or spectra since it was last seen growing.
     pub(super) since_growing: u8,
-    /// Passings or spectra in which it was below what is held.
+    /// Passings or spectra in which it was below what is held, and the time since, s.
     pub(super) below: u8,
+    pub(super) below_s: f32,
+    /// The loudest that the band was meanwhile, in the unit of [`Evidence::loudness`].
+    pub(super) loudest: f32,
+    /// Time since the band became quiet, or since nothing tells its vibration, s.
+    pub(super) quiet_s: f32,
     pub(super) confidence: f32,
     pub(super) reason: Reason,
 }
@@ -56,6 +64,9 @@ impl LatchedChatter {
             largest: finding.level_of(multiplier.kind, evidence.teeth, evidence.floors[band]),
             since_growing: 0,
             below: 0,
+            below_s: 0.0,
+            loudest: evidence.loudness[band],
+            quiet_s: 0.0,
             confidence: confidence((multiplier.abs - 1.0).abs(), multiplier.deviation),
             reason,
         }
@@ -72,6 +83,9 @@ impl LatchedChatter {
 
     /// Goes on with what is known now. True where it has died down, or nothing is cut any more.
     pub(super) fn is_over(&mut self, evidence: &Evidence<'_>, air: bool) -> bool {
+        if self.is_quiet(evidence) {
+            return true;
+        }
         let Some(level) = self.level(evidence) else {
             return false;
         };
@@ -83,14 +97,34 @@ impl LatchedChatter {
         };
         if level < RELEASE * self.largest || air {
             self.below = self.below.saturating_add(u8::from(news));
+            self.below_s += evidence.seconds;
         } else {
-            self.below = 0;
+            (self.below, self.below_s) = (0, 0.0);
         }
-        let over = self.below >= RELEASE_PASSINGS;
+        let over = self.below >= RELEASE_PASSINGS
+            || self.below >= RELEASE_PASSINGS_LEAST && self.below_s >= RELEASE_S;
         if news && !over {
             self.follow(evidence);
         }
         over
+    }
+
+    /// Whether the samples alone tell that the vibration is down, or neither passings nor spectra can tell anything of it: at standstill, and
+    /// beyond the speed up to which the band is sampled at fixed angles.
+    fn is_quiet(&mut self, evidence: &Evidence<'_>) -> bool {
+        let loudness = evidence.loudness[self.band];
+        self.loudest = self.loudest.max(loudness);
+        let is_blind = if self.by_tone {
+            evidence.speed.is_none()
+        } else {
+            evidence.findings[self.band].is_none()
+        };
+        if is_blind || loudness < RELEASE * self.loudest {
+            self.quiet_s += evidence.seconds;
+        } else {
+            self.quiet_s = 0.0;
+        }
+        self.quiet_s >= RELEASE_S
     }
 
     /// Whether what grows now is chatter of the other kind, and larger than what is held.
@@ -110,7 +144,9 @@ impl LatchedChatter {
     /// The tone that is held, where it is still the strongest.
     fn tone<'a>(&self, evidence: &Evidence<'a>) -> Option<&'a Tone> {
         let held = self.frequency?.0;
-        evidence.tones[self.band].filter(|tone| (tone.frequency.0 - held).abs() < SAME_TONE * held)
+        let beside = evidence.lines[self.band].and_then(|lines| lines.beside.as_ref());
+        let mut tones = [evidence.tones[self.band], beside].into_iter().flatten();
+        tones.find(|tone| (tone.frequency.0 - held).abs() < SAME_TONE * held)
     }
 
     /// Keeps multiplier, frequency and reason up to date.

@@ -4,6 +4,7 @@ use crate::detector::Reason;
 use crate::detector::evidence::{BANDS, Evidence};
 use crate::detector::finding::{Finding, GrowthKind};
 use crate::detector::latched_chatter::{LAST_GROWTH, LatchedChatter};
+use crate::detector::lines::LOUD;
 use crate::detector::tone::Tone;
 
 /// A residual of this part of the forced vibration that nothing explains is chatter, where a tone is in it.
@@ -17,12 +18,19 @@ const SETTLED: u32 = 24;
 /// explain, as of a cut that is far over the limit.
 pub(super) fn tone_alone(evidence: &Evidence<'_>) -> Option<LatchedChatter> {
     evidence.speed?;
+    let unsampled = evidence.findings.iter().all(Option::is_none);
     for band in 0..BANDS {
-        let Some(tone) = evidence.tones[band].filter(|tone| tone.share >= TONE_SHARE) else {
+        let lasting = evidence.lines[band]
+            .filter(|_| unsampled)
+            .and_then(|lines| lines.chatter(LOUD));
+        let Some(tone) = evidence.tones[band]
+            .filter(|tone| tone.share >= TONE_SHARE)
+            .or(lasting)
+        else {
             continue;
         };
         let heard = match evidence.findings[band] {
-            None => evidence.findings.iter().all(Option::is_none) && (tone.grows() || tone.lasts()),
+            None => unsampled && (tone.grows() || tone.lasts()),
             Some(finding) => {
                 tone.spectra >= 2
                     && is_wild(finding, WILD_SHARE)
@@ -41,6 +49,9 @@ pub(super) fn tone_alone(evidence: &Evidence<'_>) -> Option<LatchedChatter> {
             largest: tone.largest,
             since_growing: if tone.grows() { 0 } else { LAST_GROWTH },
             below: 0,
+            below_s: 0.0,
+            loudest: evidence.loudness[band],
+            quiet_s: 0.0,
             confidence: 0.8,
             reason: if tone.grows() {
                 Reason::Growing

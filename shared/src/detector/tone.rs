@@ -20,6 +20,11 @@ pub struct Background<const BINS: usize> {
 const LEARNING: u8 = 6;
 /// What has more than this many times the usual power is new.
 const NEW: f32 = 10.0;
+/// A spectrum with less than this part of the power of the sensor's noise is that of no sensor. The data sheet's noise is typical: the true
+/// one may be half of it.
+const DEAD: f32 = 0.25;
+/// So many bins beside a tone its Hann window has ended.
+const BESIDE: usize = 4;
 /// Relative step of the background per spectrum.
 const FOLLOWS: f32 = 1.0 / 64.0;
 
@@ -48,57 +53,66 @@ impl<const BINS: usize> Background<BINS> {
         *self = Self::new();
     }
 
-    /// Takes a spectrum of ordinary operation.
-    pub fn learn(&mut self, power: &[f32]) {
+    /// Takes a spectrum of ordinary operation. `noise` is the power of the sensor's noise in one bin. A spectrum without this noise is that of
+    /// a sensor that is not connected: it tells nothing of the machine.
+    pub fn learn(&mut self, power: &[f32], noise: f32) {
+        if power.iter().sum::<f32>() < DEAD * noise * power.len() as f32 {
+            return;
+        }
         let weight = 1.0 / (f32::from(self.learnt) + 1.0);
         let learning = !self.is_learnt();
         for (slot, &new) in self.power.iter_mut().zip(power) {
             let old = widen(*slot);
-            *slot = narrow(if learning {
+            let usual = if learning {
                 old + weight * (new - old)
             } else if new > old {
                 old + FOLLOWS * old
             } else {
                 old - FOLLOWS * old
-            });
+            };
+            *slot = narrow(usual.max(noise));
         }
         self.learnt = (self.learnt + 1).min(LEARNING);
     }
 
     /// The power of the bins that stand out of the background around by [`NEW`], and in all others no more than the floor of the
     /// background, so that only what is new is left.
-    fn keep_new(&self, power: &[f32], kept: &mut [f32]) {
-        for (k, (slot, &power)) in kept.iter_mut().zip(power).enumerate() {
+    fn keep_new(&self, power: &[f32], noise: f32, kept: &mut [f32]) {
+        for (k, (slot, &now)) in kept.iter_mut().zip(power).enumerate() {
             let near = self
                 .power
                 .get(k.saturating_sub(2)..(k + 3).min(BINS))
                 .unwrap_or_default();
-            let usual = near.iter().copied().max().map_or(0.0, widen);
-            *slot = if power > NEW * usual {
-                power
+            let usual = near.iter().copied().max().map_or(0.0, widen).max(noise);
+            *slot = if now > NEW * usual {
+                now
             } else {
                 // Tones are narrow: the least of the bins around is none.
                 let around = self
                     .power
                     .get(k.saturating_sub(8)..(k + 9).min(BINS))
                     .unwrap_or_default();
-                around.iter().copied().min().map_or(0.0, widen).min(power)
+                let floor = around.iter().copied().min().map_or(0.0, widen);
+                // Beside a tone that is not new, the spectrum may have fallen far below its background since.
+                let beside = [k.wrapping_sub(BESIDE), k + BESIDE];
+                let beside = beside.iter().filter_map(|&bin| power.get(bin));
+                beside.fold(floor.min(now), |least, &power| least.min(power))
             };
         }
     }
 
     /// The strongest tone between two frequencies that is no harmonic of the spindle (where its speed is known) and stands out of the background.
-    /// `work` is scratch memory for as many bins.
+    /// `noise` is the power of the sensor's noise in one bin, `work` scratch memory for as many bins.
     pub fn new_tone(
         &self,
         spectrum: &PowerSpectrum<'_>,
         rotation: Option<Rotation>,
-        from: Hertz,
-        to: Hertz,
+        (from, to): (Hertz, Hertz),
+        noise: f32,
         work: &mut [f32],
     ) -> Option<Peak> {
         let work = work.get_mut(..spectrum.power.len())?;
-        self.keep_new(spectrum.power, work);
+        self.keep_new(spectrum.power, noise, work);
         let new = PowerSpectrum {
             power: work,
             bin: spectrum.bin,
@@ -150,6 +164,7 @@ impl Tone {
     pub const HISTORY: usize = 6;
 
     /// Goes on with the tone found in the next spectrum.
+    #[inline(never)]
     pub fn follow(before: Option<Self>, found: Option<Peak>, spectrum: &PowerSpectrum<'_>) -> Option<Self> {
         let peak = found?;
         let total: f32 = spectrum.power.iter().skip(2).sum::<f32>() / crate::spectrum::HANN_NOISE_BINS;
@@ -210,6 +225,40 @@ mod tests {
     use crate::units::MetersPerSecond2;
 
     const BINS: usize = 256;
+    const NOISE: f32 = 0.1;
+
+    #[test]
+    fn silence_of_a_dead_sensor_is_no_background() {
+        let mut background = Background::<BINS>::new();
+        for _ in 0..50 {
+            background.learn(&[0.0; BINS], NOISE);
+        }
+        assert!(!background.is_learnt());
+        for seed in 0..20 {
+            background.learn(&spectrum(seed, &[(60, 5000.0)]), NOISE);
+        }
+        let power = spectrum(99, &[(60, 5000.0)]);
+        let spectrum = PowerSpectrum {
+            power: &power,
+            bin: Hertz(2.0),
+        };
+        let mut work = [0.0; BINS];
+        let hum = background.new_tone(&spectrum, None, (Hertz(10.0), Hertz(500.0)), NOISE, &mut work);
+        assert_eq!(hum, None);
+    }
+
+    #[test]
+    fn the_background_comes_back_from_a_level_below_the_noise() {
+        let mut background = Background::<BINS>::new();
+        for seed in 0..6 {
+            background.learn(&spectrum(seed, &[]).map(|power| 0.01 * power), 0.01);
+        }
+        // The tone grows by steps of 1/64 from the noise on: 20 dB in 300 spectra.
+        for seed in 0..400 {
+            background.learn(&spectrum(seed, &[(60, 1.0)]).map(|power| 0.01 * power), 0.01);
+        }
+        assert!(widen(background.power[60]) > 0.005);
+    }
 
     /// Noise of about power 1, with the three bins of a Hann window for each tone (bin, power).
     fn spectrum(seed: u32, tones: &[(usize, f32)]) -> [f32; BINS] {
@@ -228,7 +277,7 @@ mod tests {
     fn only_what_is_new_is_a_tone() {
         let mut background = Background::<BINS>::new();
         for seed in 0..20 {
-            background.learn(&spectrum(seed, &[(60, 5000.0)]));
+            background.learn(&spectrum(seed, &[(60, 5000.0)]), NOISE);
         }
         let power = spectrum(99, &[(60, 5000.0), (150, 300.0)]);
         let spectrum = PowerSpectrum {
@@ -236,7 +285,8 @@ mod tests {
             bin: Hertz(2.0),
         };
         let mut work = [0.0; BINS];
-        let mut find = |from, to| background.new_tone(&spectrum, None, Hertz(from), Hertz(to), &mut work);
+        let mut find =
+            |from, to| background.new_tone(&spectrum, None, (Hertz(from), Hertz(to)), NOISE, &mut work);
         // The hum at 120 Hz is far louder than the new tone at 300 Hz.
         let found = find(10.0, 500.0).unwrap();
         assert!((found.frequency.0 - 300.0).abs() < 0.2, "{found:?}");

@@ -4,6 +4,13 @@ use super::pipeline::Monitor;
 use super::state::State;
 use crate::tachometer::Turns;
 
+/// The place of a sample in time: `n` samples after the first of the block, and `before` samples before that.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub(super) n: usize,
+    pub(super) before: u32,
+}
+
 /// Spindle angle at the first sample of a block, and the increment of the angle per sample.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Angles {
@@ -17,11 +24,13 @@ pub(super) struct Angles {
 }
 
 impl Angles {
-    /// The spindle angle at `delay` samples before sample `n` of the block. `delay` is the group delay of the filter
+    /// The spindle angle at `delay` samples before a sample. `delay` is the group delay of the filter
     /// through which the sample passed.
-    pub(super) fn at(&self, n: usize, delay: u32) -> Turns {
-        let forward = self.per_sample.wrapping_mul(n as u64);
-        let back = self.per_sample.wrapping_mul(u64::from(delay));
+    pub(super) fn at(&self, place: Place, delay: u32) -> Turns {
+        let forward = self.per_sample.wrapping_mul(place.n as u64);
+        let back = self
+            .per_sample
+            .wrapping_mul(u64::from(delay) + u64::from(place.before));
         Turns(self.first.0.saturating_add(forward).saturating_sub(back))
     }
 }

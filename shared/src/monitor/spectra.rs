@@ -1,14 +1,15 @@
 //! The spectra of both bands, their tones, and the spindle speed estimated from them.
 
-use super::band_state::follow_tone;
+use super::band_state::{BandState, follow_tone};
 use super::pipeline::Monitor;
 use super::state::State;
 use crate::criteria::{
     ASSUMED_SPEED_UNCERTAINTY, MEASURED_SPEED_UNCERTAINTY, SPEED_TONE_BINS, SPEED_TONE_SNR,
 };
 use crate::decimation::{STRUCTURE_BAND, TOOL_BAND};
-use crate::peaks::Rotation;
-use crate::spectrum::{PowerSpectrum, structure_spectrum, tool_spectrum};
+use crate::detector::lines::Lines;
+use crate::peaks::{Peak, Rotation};
+use crate::spectrum::{HANN_NOISE_BINS, PowerSpectrum, structure_spectrum, tool_spectrum};
 use crate::units::Hertz;
 
 /// Axes over which the power spectra are summed: all three.
@@ -61,29 +62,83 @@ impl Monitor {
             state.tone_speed = None;
         }
         let rotation = self.rotation(state, measured);
+        // Samples at fixed angles tell more than lines.
+        let nominal = rotation.filter(|_| measured.is_none());
         if state.tool.fresh {
-            follow_tone(&mut state.tool, rotation, TOOL_TONES, chatter, &mut state.work);
+            self.follow_lines(&mut state.tool, nominal, TOOL_TONES);
         }
         if state.structure.fresh {
+            self.follow_lines(&mut state.structure, nominal, STRUCTURE_TONES);
+        }
+        let noise = |bin: Hertz| AXES.len() as f32 * self.noise_density() * HANN_NOISE_BINS * bin.0;
+        if state.tool.fresh {
+            let noise = noise(state.tool.bin);
+            follow_tone(
+                &mut state.tool,
+                rotation,
+                TOOL_TONES,
+                chatter,
+                noise,
+                &mut state.work,
+            );
+        }
+        if state.structure.fresh {
+            let noise = noise(state.structure.bin);
             follow_tone(
                 &mut state.structure,
                 rotation,
                 STRUCTURE_TONES,
                 chatter,
+                noise,
                 &mut state.work,
             );
         }
     }
 
-    /// Spindle speed in revolutions per second, from the strongest tone of the spectrum near the assumed
-    /// tooth-passing frequency; `None` if no spindle speed is assumed or no tone there is strong enough.
-    fn speed_from_tone(&self, spectrum: &PowerSpectrum<'_>) -> Option<Hertz> {
-        let assumed = self.settings.assumed_speed?.to_hertz().0 * f32::from(self.settings.tool.teeth);
-        let reach = ASSUMED_SPEED_UNCERTAINTY * assumed + spectrum.bin.0;
-        let peak = spectrum.dominant(Hertz(assumed - reach), Hertz(assumed + reach))?;
-        let near = (peak.frequency.0 - assumed).abs() < reach;
-        (near && peak.snr > SPEED_TONE_SNR)
-            .then_some(Hertz(peak.frequency.0 / f32::from(self.settings.tool.teeth)))
+    /// Finds the lines of a spindle, whose speed is not measured, in the new spectrum of a band.
+    fn follow_lines<const POINTS: usize, const BINS: usize>(
+        &self,
+        band: &mut BandState<POINTS, BINS>,
+        nominal: Option<Rotation>,
+        range: (Hertz, Hertz),
+    ) {
+        let spectrum = PowerSpectrum {
+            power: &band.power,
+            bin: band.bin,
+        };
+        band.lines = nominal.map(|rotation| {
+            let teeth = self.settings.tool.teeth;
+            Lines::follow(band.lines.as_ref(), &spectrum, rotation, teeth, range)
+        });
+    }
+
+    /// Rotation of the spindle from the tones of the spectrum near the harmonics of the assumed tooth-passing frequency; `None` if no
+    /// spindle speed is assumed or no tone near the first harmonic is strong enough. Each further harmonic that is found makes it sharper.
+    fn speed_from_tone(&self, spectrum: &PowerSpectrum<'_>) -> Option<Rotation> {
+        let teeth = f32::from(self.settings.tool.teeth);
+        let assumed = self.settings.assumed_speed?.to_hertz();
+        let mut rotation = Rotation {
+            frequency: assumed,
+            uncertainty: Hertz(ASSUMED_SPEED_UNCERTAINTY * assumed.0),
+        };
+        for harmonic in [1.0, 2.0, 4.0, 8.0] {
+            let orders = harmonic * teeth;
+            let expected = orders * rotation.frequency.0;
+            let reach = orders * rotation.uncertainty.0 + spectrum.bin.0;
+            let found = spectrum.dominant(Hertz(expected - reach), Hertz(expected + reach));
+            let near = |peak: &Peak| (peak.frequency.0 - expected).abs() < reach && peak.snr > SPEED_TONE_SNR;
+            let Some(peak) = found.filter(near) else {
+                return (harmonic > 1.0).then_some(rotation);
+            };
+            let uncertainty = SPEED_TONE_BINS * spectrum.bin.0 / orders;
+            if uncertainty < rotation.uncertainty.0 {
+                rotation = Rotation {
+                    frequency: Hertz(peak.frequency.0 / orders),
+                    uncertainty: Hertz(uncertainty),
+                };
+            }
+        }
+        Some(rotation)
     }
 
     /// Spindle speed with its uncertainty: measured by the tachometer, else from the spectrum, else assumed; `None` if
@@ -97,10 +152,7 @@ impl Monitor {
             return Some(with(measured, MEASURED_SPEED_UNCERTAINTY * measured.0));
         }
         if let Some(from_tone) = state.tone_speed {
-            return Some(with(
-                from_tone,
-                SPEED_TONE_BINS * state.tool.bin.0 / f32::from(self.settings.tool.teeth),
-            ));
+            return Some(from_tone);
         }
         let assumed = self.settings.assumed_speed?.to_hertz();
         Some(with(assumed, ASSUMED_SPEED_UNCERTAINTY * assumed.0))

@@ -4,12 +4,13 @@ use heapless::Vec;
 
 use super::band_state::BandState;
 use super::{Band, MAX_BLOCK_STROBES, Strobe};
-use crate::acceleration::SampleClockState;
+use crate::acceleration::{Counts, SampleClockState};
 use crate::advice::Advice;
 use crate::decimation;
 use crate::detector::Verdict;
 use crate::detector::finding::Finding;
 use crate::detector::judge::Detector;
+use crate::peaks::Rotation;
 use crate::spectrum::{PowerSpectrum, STRUCTURE_BINS, STRUCTURE_POINTS, TOOL_BINS, TOOL_POINTS};
 use crate::tachometer::TachometerState;
 use crate::units::{Degrees, Hertz, Rpm};
@@ -22,6 +23,8 @@ pub struct State {
     pub(super) tachometer: TachometerState,
     /// Number of times that the tachometer had lost its lock up to the preceding block.
     pub(super) losses: u32,
+    /// The newest sample of the sensor.
+    pub(super) last_counts: Counts,
     pub(super) decimation: decimation::State,
     pub(super) structure: BandState<STRUCTURE_POINTS, STRUCTURE_BINS>,
     pub(super) tool: BandState<TOOL_POINTS, TOOL_BINS>,
@@ -29,9 +32,9 @@ pub struct State {
     pub(super) work: [f32; STRUCTURE_POINTS],
     /// Running mean over the blocks of the share of samples that are clipped or lost.
     pub(super) damage: f32,
-    /// Spindle speed estimated from the newest spectrum of the tool band, in revolutions per second; `None` if the
+    /// Rotation of the spindle estimated from the newest spectrum of the tool band; `None` if the
     /// tachometer measures the speed, or if no tooth-passing tone was found.
-    pub(super) tone_speed: Option<Hertz>,
+    pub(super) tone_speed: Option<Rotation>,
     pub(super) detector: Detector,
     pub(super) advice: Option<Advised>,
     pub(super) strobes: Vec<Strobe, MAX_BLOCK_STROBES>,
@@ -64,6 +67,7 @@ impl State {
             sample_clock: SampleClockState::new(),
             tachometer: TachometerState::new(),
             losses: 0,
+            last_counts: [0; 3],
             decimation: decimation::State::new(),
             structure: BandState::new(),
             tool: BandState::new(),
@@ -83,6 +87,7 @@ impl State {
             sample_clock,
             tachometer,
             losses,
+            last_counts,
             decimation,
             structure,
             tool,
@@ -96,6 +101,7 @@ impl State {
         } = self;
         *sample_clock = SampleClockState::new();
         *tachometer = TachometerState::new();
+        *last_counts = [0; 3];
         *decimation = decimation::State::new();
         structure.reset();
         tool.reset();

@@ -1,7 +1,7 @@
 //! Samples of both bands: collected for spectra, and resampled at fixed spindle angles into tooth periods.
 
 use super::Band;
-use super::angles::Angles;
+use super::angles::{Angles, Place};
 use super::band_state::BandState;
 use super::pipeline::Monitor;
 use super::state::State;
@@ -27,7 +27,7 @@ impl Monitor {
         angles.samples_per_tooth >= least * divisor as f32 && angles.deviation < ANGLE_DEVIATION_MAX
     }
 
-    pub(super) fn take_tool(&self, state: &mut State, sample: Sample, n: usize, angles: Option<&Angles>) {
+    pub(super) fn take_tool(&self, state: &mut State, sample: Sample, place: Place, angles: Option<&Angles>) {
         let band = &mut state.tool;
         band.take(sample, TOOL_HOP);
         let Some(angles) =
@@ -39,7 +39,7 @@ impl Monitor {
             teeth: self.settings.tool.teeth,
             method: Method::Value,
         };
-        let angle = angles.at(n, self.decimation.tool_delay());
+        let angle = angles.at(place, self.decimation.tool_delay());
         let unit = self.unit();
         let Some(passed) = sampler.step(&mut band.sampler, sample.map(|x| x as f32 * unit), angle) else {
             return;
@@ -62,7 +62,7 @@ impl Monitor {
             self.decimation.structure_divisor(),
             STRUCTURE_SAMPLES_PER_TOOTH,
         ) {
-            show(&mut state.strobes, Band::Tool, &passed);
+            show(&mut state.strobes, Band::Tool, &passed, self.settings.tool.teeth);
         }
     }
 
@@ -70,7 +70,7 @@ impl Monitor {
         &self,
         state: &mut State,
         sample: Sample,
-        n: usize,
+        place: Place,
         angles: Option<&Angles>,
     ) {
         let band = &mut state.structure;
@@ -83,7 +83,7 @@ impl Monitor {
             teeth: self.settings.tool.teeth,
             method: Method::Mean,
         };
-        let angle = angles.at(n, self.decimation.structure_delay());
+        let angle = angles.at(place, self.decimation.structure_delay());
         let unit = self.unit();
         let Some(passed) = sampler.step(&mut band.sampler, sample.map(|x| x as f32 * unit), angle) else {
             return;
@@ -94,7 +94,12 @@ impl Monitor {
         let bandwidth = 0.5 * rate * SLOTS as f32 / angles.samples_per_tooth;
         let noise = self.noise_density() * bandwidth.min(0.5 * rate / divisor as f32);
         self.take_passing(band, &passed, noise, Evaluation::Close);
-        show(&mut state.strobes, Band::Structure, &passed);
+        show(
+            &mut state.strobes,
+            Band::Structure,
+            &passed,
+            self.settings.tool.teeth,
+        );
     }
 
     /// Passes a complete tooth period of a band to the estimators of growth. `noise` is the variance of the sensor
@@ -107,13 +112,15 @@ impl Monitor {
         look: Evaluation,
     ) {
         band.floor = math::sqrt(noise);
-        band.growth.push(
-            passed.tooth,
-            &passed.passing,
-            noise,
-            self.settings.tool.teeth,
-            look,
-        );
+        band.since_passing_s = 0.0;
+        let mut passing = passed.passing;
+        if band.spoiled > 0 {
+            band.spoiled -= 1;
+            // That of a revolution ago is nearer to the truth.
+            passing = band.growth.a_revolution_ago().unwrap_or(passing);
+        }
+        band.growth
+            .push(passed.tooth, &passing, noise, self.settings.tool.teeth, look);
         if look >= Evaluation::Quick {
             // The detector gets a new finding only when the growth of the vibration was evaluated.
             band.passed = true;

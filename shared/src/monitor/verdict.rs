@@ -4,7 +4,9 @@ use super::pipeline::Monitor;
 use super::settings::Settings;
 use super::state::{Advised, State};
 use crate::advice::{self, Advice};
-use crate::criteria::{ADVICE_FREQUENCY_STEP, ADVICE_SPEED_STEP, DAMAGE_MAX, SPEED_CHANGE_MAX};
+use crate::criteria::{
+    ADVICE_FREQUENCY_STEP, ADVICE_SPEED_STEP, DAMAGE_MAX, SPEED_CHANGE_MAX, STALE_S, STALE_TOOTH_PERIODS,
+};
 use crate::detector::Judgement;
 use crate::detector::evidence::Evidence;
 use crate::detector::finding::Finding;
@@ -16,15 +18,24 @@ use crate::working_point::WorkingPoint;
 impl Monitor {
     /// Passes the findings on growth, the spectra and the tones of both bands to the chatter detector. Returns its
     /// verdict.
-    pub(super) fn judge(&self, state: &mut State, speed: Option<Rpm>) -> Judgement {
+    pub(super) fn judge(&self, state: &mut State, speed: Option<Rpm>, seconds: f32) -> Judgement {
         let change = state.tachometer.change_per_turn().unwrap_or(0.0);
         let sampled = self.tachometer.is_some();
-        let finding = |growth: &Growth| -> Option<Finding> {
-            Some(*growth.finding()).filter(|finding| sampled && finding.passings > 0)
+        let teeth = f32::from(self.settings.tool.teeth);
+        let tooth_period_s = speed.map_or(0.0, |speed| 1.0 / (speed.to_hertz().0 * teeth));
+        let stale_s = (STALE_TOOTH_PERIODS * tooth_period_s).max(STALE_S);
+        let finding = |growth: &Growth, since_passing_s: f32| -> Option<Finding> {
+            let is_fresh = sampled && since_passing_s < stale_s;
+            Some(*growth.finding()).filter(|finding| is_fresh && finding.passings > 0)
         };
-        let (structure, tool) = (finding(&state.structure.growth), finding(&state.tool.growth));
+        let (structure, tool) = (
+            finding(&state.structure.growth, state.structure.since_passing_s),
+            finding(&state.tool.growth, state.tool.since_passing_s),
+        );
         let evidence = Evidence {
             speed: speed.map(Rpm::to_hertz),
+            seconds,
+            loudness: [state.structure.loudness.level(), state.tool.loudness.level()],
             changing: change.abs() > SPEED_CHANGE_MAX,
             damaged: state.damage > DAMAGE_MAX,
             teeth: self.settings.tool.teeth,
@@ -32,8 +43,8 @@ impl Monitor {
             new_passings: [state.structure.passed, state.tool.passed],
             floors: [state.structure.floor, state.tool.floor],
             spectra: [state.structure.spectrum(), state.tool.spectrum()],
+            lines: [state.structure.lines.as_ref(), state.tool.lines.as_ref()],
             tones: [state.structure.tone.as_ref(), state.tool.tone.as_ref()],
-            heard: state.tool.background.is_learnt(),
             new_spectra: [state.structure.fresh, state.tool.fresh],
         };
         state.detector.step(&evidence)

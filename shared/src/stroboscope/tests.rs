@@ -223,3 +223,18 @@ fn rows_know_their_class() {
     assert_eq!(stroboscope.filled(), CAPACITY);
     assert!(window.row(3).iter().all(|v| *v == 0.0) && window.row(3).len() == CHANNELS);
 }
+
+#[test]
+fn the_passing_of_a_revolution_ago_is_that_of_the_same_tooth() {
+    let mut stroboscope = Stroboscope::new(3);
+    assert_eq!(stroboscope.a_revolution_ago(), None);
+    for tooth in 0..10 {
+        stroboscope.push(tooth, &[tooth as f32; CHANNELS]);
+        let expected = (tooth >= 2).then_some([tooth as f32 - 2.0; CHANNELS]);
+        assert_eq!(stroboscope.a_revolution_ago(), expected);
+    }
+    // The memory of the device is zero before its first settings.
+    stroboscope.reset();
+    stroboscope.classes = 0;
+    assert_eq!(stroboscope.a_revolution_ago(), None);
+}

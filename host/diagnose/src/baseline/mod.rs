@@ -3,6 +3,7 @@
 pub(crate) mod cubic_term;
 pub(crate) mod dynamic_stiffness;
 pub(crate) mod receptance;
+pub(crate) mod uncertain;
 
 use self::cubic_term::cubic_term;
 use self::receptance::Receptance;
@@ -64,15 +65,6 @@ impl<'a> Baseline<'a> {
             velocity_jumps: dynamics.velocity_jumps(),
             axes: axes_of(structure),
         })
-    }
-
-    /// The linear structure with the linear extensions of the baseline and those in `effect`, in first-order form.
-    ///
-    /// # Errors
-    /// An effect in `effect` does not apply to this structure.
-    pub(crate) fn altered(&self, effect: &Effects) -> Result<FirstOrder, ModelError> {
-        let (dynamics, _) = self.effects.clone().and(effect).dynamics(self.structure)?;
-        Ok(dynamics.first_order())
     }
 
     /// True if the baseline structure has a rigid-body mode: a pole within 1e-9 times the largest |pole| (taken as at

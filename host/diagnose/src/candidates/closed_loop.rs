@@ -9,7 +9,7 @@ use crate::records::domain::Domain;
 use crate::records::record::Record;
 use crate::records::study::Study;
 use crate::signal::grid::{Grid, catmull_rom};
-use quietcut_model::structure::FirstOrder;
+use quietcut_model::structure::{FirstOrder, Structure};
 use quietcut_recording::TestKind;
 use quietcut_simulate::{Drive, Dynamics, Effects, Model, MotionState, Reading, Settings};
 
@@ -86,6 +86,14 @@ fn largest_m(record: &Record) -> f64 {
     (0..3)
         .map(|axis| record.motion.largest_m(axis))
         .fold(f64::MIN_POSITIVE, f64::max)
+}
+
+/// What is simulated: effects beside those of the baseline, on its structure or another.
+pub(crate) struct Extended {
+    /// The further effects.
+    pub effects: Effects,
+    /// The structure without effects; `None` for that of the baseline.
+    pub structure: Option<Structure>,
 }
 
 /// The drives of all records.
@@ -196,9 +204,10 @@ impl ClosedLoop {
         }
     }
 
-    fn model(&self, study: &Study<'_>, record: usize, effects: &Effects) -> Option<Model> {
-        let all = study.baseline.effects.clone().and(effects);
-        let (dynamics, restoring_forces) = all.dynamics(study.baseline.structure).ok()?;
+    fn model(&self, study: &Study<'_>, record: usize, extended: &Extended) -> Option<Model> {
+        let all = study.baseline.effects.clone().and(&extended.effects);
+        let structure = extended.structure.as_ref().unwrap_or(study.baseline.structure);
+        let (dynamics, restoring_forces) = all.dynamics(structure).ok()?;
         Some(Model {
             dynamics,
             cutting: None,
@@ -208,14 +217,14 @@ impl ClosedLoop {
     }
 
     /// True where a term can hold an axis, as dry friction does.
-    pub(crate) fn holds(&self, study: &Study<'_>, effects: &Effects) -> Option<bool> {
-        let model = self.model(study, 0, effects)?;
+    pub(crate) fn holds(&self, study: &Study<'_>, extended: &Extended) -> Option<bool> {
+        let model = self.model(study, 0, extended)?;
         Some(model.restoring_forces.iter().any(|term| term.holds().is_some()))
     }
 
     /// True where the extended case has terms of its own beside the linear structure.
-    pub(crate) fn is_nonlinear(&self, study: &Study<'_>, effects: &Effects) -> bool {
-        self.model(study, 0, effects)
+    pub(crate) fn is_nonlinear(&self, study: &Study<'_>, extended: &Extended) -> bool {
+        self.model(study, 0, extended)
             .is_some_and(|model| !model.restoring_forces.is_empty())
     }
 
@@ -226,10 +235,10 @@ impl ClosedLoop {
         &self,
         study: &Study<'_>,
         record: usize,
-        effects: &Effects,
+        extended: &Extended,
         structure: &[f64],
     ) -> Option<(Vec<f64>, Vec<Option<f64>>)> {
-        let model = self.model(study, record, effects)?;
+        let model = self.model(study, record, extended)?;
         let order = model.dynamics.order();
         let mut states = structure.to_vec();
         states.resize(order, 0.0);
@@ -253,24 +262,24 @@ impl ClosedLoop {
         Some((states, sizes))
     }
 
-    /// What each channel reads in the first `length` samples, zero behind them, while the case with `effects` moves under
+    /// What each channel reads in the first `length` samples, zero behind them, while the case that is `extended` moves under
     /// the forces of the record; from rest where `start` is empty.
     pub(crate) fn simulate(
         &self,
         study: &Study<'_>,
         index: usize,
-        effects: &Effects,
+        extended: &Extended,
         start: &[f64],
         length: usize,
     ) -> Option<Vec<Vec<f64>>> {
         let record = &study.records[index];
-        let model = self.model(study, index, effects)?;
+        let model = self.model(study, index, extended)?;
         let count = record.grid.count();
         let rate_hz = record.grid.rate_hz();
         let mut readings: Vec<Reading> = record
             .channels
             .iter()
-            .map(|channel| effects.pickup(channel.pickup.clone()))
+            .map(|channel| extended.effects.pickup(channel.pickup.clone()))
             .map(|pickup| Reading::new(&model, pickup, rate_hz, length))
             .collect();
         let settings = Settings {

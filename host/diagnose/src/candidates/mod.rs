@@ -2,6 +2,7 @@
 //! on records: regressors, start values, bounds. Code that several causes share is, for example, in
 //! [`linear_parameter`], [`restoring`], [`process`] and [`sensor`].
 
+pub(crate) mod altered_structure;
 mod axial_depth_modulation;
 mod backlash;
 pub(crate) mod cause;

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::conclusion::lobes::{Chart, Lobes};
 use crate::conclusion::residual_views::ResidualView;
+use crate::conclusion::updates::{BaselineUpdate, Posterior};
 
 pub(crate) use quietcut_numerics::statistics::NINETY_PERCENT;
 
@@ -21,6 +22,9 @@ pub enum Outcome {
     Confounded,
     /// No candidate model explains enough of the residual.
     Unexplained,
+    /// The baseline agrees with the records within the noise if parameters that its case states as uncertain are other than
+    /// those of the case.
+    Update,
 }
 
 /// An estimated quantity and its 90 % confidence interval.
@@ -238,6 +242,8 @@ pub struct Diagnosis {
     /// The causes of the best candidate model; if the outcome is `Confounded`, followed by those that equivalent
     /// candidate models add.
     pub causes: Vec<EstimatedCause>,
+    /// Parameters that the case states as uncertain and that the records move, with the causes acting.
+    pub updates: Vec<BaselineUpdate>,
     /// Groups of names of causes that the records cannot separate; empty unless the outcome is `Confounded`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub equivalent: Vec<Vec<&'static str>>,
@@ -270,6 +276,10 @@ pub struct Diagnosis {
     /// Number of entries of `causes`, from the first, that act together in the extended case; 0 without an extension.
     #[serde(skip)]
     pub acting: usize,
+    /// The uncertain parameters of the case after the records, with the causes acting; `None` if the case states none, or the
+    /// records were not compared with them.
+    #[serde(skip)]
+    pub posterior: Option<Posterior>,
     /// Measured samples and residuals, one view for each channel of each record: by record, then by channel.
     #[serde(skip)]
     pub views: Vec<ResidualView>,

@@ -1,13 +1,17 @@
 //! Concludes a diagnosis: selects a candidate model and turns it into an answer.
 
+use crate::baseline::uncertain::Uncertain;
 use crate::conclusion::answer::{Diagnosis, EstimatedCause, Gain, Outcome, Quality, Unexplained};
+use crate::conclusion::nearest_baseline::nearest_baseline;
 use crate::conclusion::parameter_estimates::{by_common_factor, parameter_estimates};
 use crate::conclusion::residual_views::{ResidualView, residual_views};
+use crate::conclusion::updates::Posterior;
 use crate::criteria::{
     CHANCE_OF_DOUBT, CONFIDENCE_LOSS, CONFIDENCE_WIDTH, DOUBT, DOUBTFUL_RESIDUAL, EQUIVALENT,
     HIGHEST_CONFIDENCE, NOISE_TOLERANCE, UNEXPLAINED_OF_FORCE, UNEXPLAINED_OF_RESPONSE,
     UNEXPLAINED_PER_FURTHER_CAUSE, UNLIKE_SEGMENTS,
 };
+use crate::error::DiagnoseError;
 use crate::fit::candidate_model::CandidateModel;
 use crate::fit::library::Library;
 use crate::fit::regression::{Regression, Subset};
@@ -16,13 +20,56 @@ use crate::records::checks;
 use crate::records::domain::Domain;
 use crate::records::study::Study;
 use crate::selection::select::{Selection, SelectionCriteria, names, select};
+use quietcut_model::case::Case;
 use quietcut_model::effects::EffectName;
 use quietcut_recording::Recording;
 
-pub(crate) fn conclude(
-    study: &Study<'_>,
+/// The baseline as its case has it, beside its records.
+struct Written<'a> {
+    study: &'a Study<'a>,
+    regression: Regression,
+}
+
+impl Written<'_> {
+    fn quality(&self) -> Quality {
+        let nrmse = |subset| self.regression.nrmse(self.study, subset);
+        Quality {
+            nrmse_heldout: nrmse(Subset::HeldOut),
+            nrmse_whole: nrmse(Subset::Whole),
+        }
+    }
+}
+
+/// Concludes the diagnosis of records that are not all answered by their orders. What the case states as uncertain of its
+/// structure is fitted with every candidate model, unless a record is a cut.
+///
+/// # Errors
+/// The case cannot be simulated, or a recording cannot be compared.
+pub(crate) fn of_records(
+    case: &Case,
     recordings: &[Recording],
     _options: &Options,
+    watch: &dyn Fn(Stage),
+) -> Result<Diagnosis, DiagnoseError> {
+    let study = Study::new(case, recordings)?;
+    let written = Written {
+        regression: Regression::new(&study),
+        study: &study,
+    };
+    let uncertain = Uncertain::of_case(case);
+    let is_cut = study.records.iter().any(|record| record.cut.is_some());
+    if is_cut || uncertain.len() == 0 {
+        return Ok(conclude(&written, written.study, recordings, watch));
+    }
+    let (nearest, uncertain) = nearest_baseline(case, recordings, uncertain);
+    let study = Study::uncertain(&nearest, recordings, uncertain)?;
+    Ok(conclude(&written, &study, recordings, watch))
+}
+
+fn conclude(
+    written: &Written<'_>,
+    study: &Study<'_>,
+    recordings: &[Recording],
     watch: &dyn Fn(Stage),
 ) -> Diagnosis {
     watch(Stage::Library);
@@ -34,10 +81,11 @@ pub(crate) fn conclude(
     let criteria = SelectionCriteria::new(study, recordings, &library, &regression);
     let selection = select(&criteria, &mut library, &mut regression, watch);
     watch(Stage::Answer);
-    answer(&criteria, &library, &mut regression, &selection)
+    answer(written, &criteria, &library, &mut regression, &selection)
 }
 
 fn answer(
+    written: &Written<'_>,
     criteria: &SelectionCriteria<'_>,
     library: &Library,
     regression: &mut Regression,
@@ -48,25 +96,39 @@ fn answer(
     let held_out = regression.residual(Subset::HeldOut);
     let count = regression.count(Subset::HeldOut) as f64;
     let whole = regression.residual(Subset::Whole);
-    let views = residual_views(study, library, selection.best.as_ref());
-    let mut diagnosis = of_baseline(study, library, regression, views);
-    let baseline_quality = diagnosis.baseline;
+    let mut diagnosis = of_baseline(written.quality(), library);
+    let nrmse = |subset| regression.nrmse(study, subset);
+    let nearest = Quality {
+        nrmse_heldout: nrmse(Subset::HeldOut),
+        nrmse_whole: nrmse(Subset::Whole),
+    };
+    let written_held_out = written.regression.residual(Subset::HeldOut);
+    diagnosis.views = views(written, study, library, selection.best.as_ref());
     let (of_noise, of_excess) = criteria.excess(regression, selection.best.as_ref());
     let allowed = allowed_residual(study, selection.best.as_ref());
     if of_noise > NOISE_TOLERANCE {
         diagnosis.unexplained.fraction = of_excess;
     }
-    let Some(best) = selection
+    let accepted = selection
         .best
         .as_ref()
-        .filter(|_| of_noise <= NOISE_TOLERANCE || of_excess <= allowed)
-    else {
+        .filter(|_| of_noise <= NOISE_TOLERANCE || of_excess <= allowed);
+    diagnosis.posterior = posterior(written, criteria, library, regression, accepted);
+    diagnosis.updates = diagnosis
+        .posterior
+        .as_ref()
+        .map_or_else(Vec::new, Posterior::updates);
+    let Some(best) = accepted else {
         if of_noise > NOISE_TOLERANCE {
             // No candidate model is accepted: the views show the residual of the baseline.
-            diagnosis.views = residual_views(study, library, None);
+            diagnosis.views = views(written, study, library, None);
             diagnosis.unexplained.location = crate::conclusion::unexplained::describe(&diagnosis.views);
             diagnosis.outcome = Outcome::Unexplained;
             diagnosis.unexplained.guess = crate::conclusion::guess::guess(study, regression);
+        } else if !diagnosis.updates.is_empty() {
+            diagnosis.outcome = Outcome::Update;
+            diagnosis.extended = Some(nearest);
+            diagnosis.gain = Some(Gain::new(written_held_out, held_out, count));
         }
         return diagnosis;
     };
@@ -86,18 +148,23 @@ fn answer(
     // Errors of the computation are proportional to the signal. If they resemble the contribution of a cause, they bias
     // the parameters of the cause, so the variances are raised.
     let uncertain = inflation + criteria.coherent;
-    let spread = |model: &CandidateModel| {
-        let closed = criteria.closed.as_ref();
-        closed.and_then(|closed| closed.spread_by_force_noise(library, model))
+    let estimated = |model: &CandidateModel| {
+        let Some(closed) = &criteria.closed else {
+            return model.clone();
+        };
+        let model = closed
+            .with_covariance(library, model)
+            .unwrap_or_else(|| model.clone());
+        closed.spread_by_force_noise(library, &model).unwrap_or(model)
     };
-    let best = &spread(best).unwrap_or_else(|| best.clone());
+    let best = &estimated(best);
     diagnosis.causes = parameter_estimates(study, library, regression, best, uncertain, confidence);
     diagnosis.acting = diagnosis.causes.len();
     diagnosis.warnings.extend(unit_warnings(&diagnosis.causes));
     diagnosis.explanations = vec![diagnosis.causes.clone()];
     let who = names(library, best);
     for other in &selection.others {
-        let other = &spread(other).unwrap_or_else(|| other.clone());
+        let other = &estimated(other);
         let causes = parameter_estimates(study, library, regression, other, uncertain, confidence);
         diagnosis.add_rival(causes, names(library, other) == who);
     }
@@ -109,25 +176,16 @@ fn answer(
     }
     let share = |left: f64, there: f64| (left / there.max(f64::MIN_POSITIVE)).sqrt();
     diagnosis.extended = Some(Quality {
-        nrmse_heldout: baseline_quality.nrmse_heldout * share(left_held_out, held_out),
-        nrmse_whole: baseline_quality.nrmse_whole * share(best.fit.left, whole),
+        nrmse_heldout: nearest.nrmse_heldout * share(left_held_out, held_out),
+        nrmse_whole: nearest.nrmse_whole * share(best.fit.left, whole),
     });
-    diagnosis.gain = Some(Gain::new(held_out, left_held_out, count));
+    diagnosis.gain = Some(Gain::new(written_held_out, left_held_out, count));
     diagnosis
 }
 
 /// The answer if the baseline is right, with the warnings of the library, and one more if the prediction error is much
 /// larger on the whole records than on the held-out segments.
-fn of_baseline(
-    study: &Study<'_>,
-    library: &Library,
-    regression: &Regression,
-    views: Vec<ResidualView>,
-) -> Diagnosis {
-    let baseline = Quality {
-        nrmse_heldout: regression.nrmse(study, Subset::HeldOut),
-        nrmse_whole: regression.nrmse(study, Subset::Whole),
-    };
+fn of_baseline(baseline: Quality, library: &Library) -> Diagnosis {
     let mut warnings = library.unexamined.clone();
     if baseline.nrmse_whole > UNLIKE_SEGMENTS * baseline.nrmse_heldout {
         warnings.push(format!(
@@ -154,8 +212,54 @@ fn of_baseline(
         warnings,
         explanations: Vec::new(),
         acting: 0,
-        views,
+        posterior: None,
+        updates: Vec::new(),
+        views: Vec::new(),
     }
+}
+
+/// The residuals of the case as it is, and what its uncertain parameters and `best` leave of them.
+fn views(
+    written: &Written<'_>,
+    study: &Study<'_>,
+    library: &Library,
+    best: Option<&CandidateModel>,
+) -> Vec<ResidualView> {
+    let mut views = residual_views(study, library, best);
+    if study.uncertain.len() > 0 {
+        let as_written = residual_views(written.study, library, None);
+        for (view, written) in views.iter_mut().zip(as_written) {
+            let fitted = std::mem::replace(&mut view.residual, written.residual);
+            if view.left.is_empty() {
+                view.left = fitted;
+            }
+        }
+    }
+    views
+}
+
+/// The uncertain parameters of the case after the records, with the causes of `best`; `None` without such parameters.
+fn posterior(
+    written: &Written<'_>,
+    criteria: &SelectionCriteria<'_>,
+    library: &Library,
+    regression: &Regression,
+    best: Option<&CandidateModel>,
+) -> Option<Posterior> {
+    let uncertain = &criteria.study.uncertain;
+    let simulated = match best {
+        Some(best) => best
+            .simulated
+            .as_ref()
+            .and_then(|simulated| simulated.baseline.clone()),
+        None => criteria.baseline.clone(),
+    };
+    let (z, covariance) = simulated.or_else(|| {
+        let columns = best.map_or_else(Vec::new, |best| library.columns_of(best));
+        let (change, covariance) = regression.after(&columns, best.map(|best| &best.fit))?;
+        Some((&uncertain.at + change, covariance))
+    })?;
+    Posterior::new(written.study.baseline.case, &uncertain.variables, &z, &covariance)
 }
 
 /// Largest share of the baseline's residual energy above the noise that may stay unexplained by the candidate model

@@ -7,6 +7,7 @@ use toml::Table;
 use crate::candidates::extension_tables::joined;
 use crate::conclusion::answer::{Diagnosis, EstimatedCause, Figure, Outcome};
 use crate::conclusion::lobes::IntervalEnds;
+use crate::conclusion::updated_case::updated;
 use quietcut_model::case::Case;
 
 /// TOML comment with the 90 % intervals of the parameter `key` in all `causes` that have it, numbered keys (`ratio_1`,
@@ -37,18 +38,28 @@ impl Diagnosis {
         found.map(|cause| (cause.name, &cause.extension))
     }
 
-    /// The case with the extensions of the acting causes; `None` without acting causes.
+    /// The case with the extensions of the acting causes and the values of its uncertain parameters after the records; `None` if
+    /// the outcome is none of a cause, confounded and update, or a value is not valid.
     pub fn extended(&self, case: &Case) -> Option<Case> {
-        (self.acting > 0).then(|| {
-            let mut extended = case.clone();
-            extended.extensions.extend(joined(self.found()));
-            extended
-        })
+        if !self.extends() {
+            return None;
+        }
+        let mut extended = case.clone();
+        extended.extensions.extend(joined(self.found()));
+        let is_valid = self
+            .posterior
+            .as_ref()
+            .is_none_or(|posterior| posterior.shift(&mut extended));
+        is_valid.then_some(extended)
+    }
+
+    fn extends(&self) -> bool {
+        self.acting > 0 || self.outcome == Outcome::Update
     }
 
     /// The extended case with parameters at both ends of the 90 % interval along each principal direction of the
     /// correlation of a cause's fitted parameters, for one cause after the other. The parameters of different causes
-    /// are taken as independent.
+    /// are taken as independent, and those of the case are at their values after the records.
     pub fn moved(&self, case: &Case) -> Vec<IntervalEnds> {
         let found = &self.causes[..self.acting];
         let choices = found
@@ -56,6 +67,9 @@ impl Diagnosis {
             .map(|cause| cause.choice)
             .max()
             .map_or(0, |last| last + 1);
+        let Some(center) = self.extended(case) else {
+            return Vec::new();
+        };
         let mut all = Vec::new();
         for choice in 0..choices {
             let directions = found
@@ -68,7 +82,7 @@ impl Diagnosis {
                         true => (cause.name, &cause.moved[direction][end]),
                         false => (cause.name, &cause.extension),
                     });
-                    let mut moved = case.clone();
+                    let mut moved = center.clone();
                     moved.extensions.extend(joined(tables));
                     moved
                 }));
@@ -77,15 +91,20 @@ impl Diagnosis {
         all
     }
 
-    /// The text of the extended case: that of the case, with a table `[extension.NAME]` for each acting cause, and the
-    /// 90 % intervals of its parameters as comments. `None` if the outcome is neither a cause nor confounded.
+    /// The text of the extended case: that of the case, with its uncertain parameters after the records, a table
+    /// `[extension.NAME]` for each acting cause, and the 90 % intervals of its parameters as comments. `None` if the outcome is none
+    /// of a cause, confounded and update.
     ///
     /// Of confounded candidate models it contains the first.
     pub fn extended_case(&self, case_text: &str) -> Option<String> {
-        if !matches!(self.outcome, Outcome::Cause | Outcome::Confounded) {
+        if !self.extends() {
             return None;
         }
-        let mut text = case_text.trim_end().to_owned();
+        let mut text = match &self.posterior {
+            Some(posterior) => updated(case_text, posterior)?,
+            None => case_text.into(),
+        };
+        text.truncate(text.trim_end().len());
         text.push('\n');
         let found = &self.causes[..self.acting];
         for (name, table) in joined(self.found()) {

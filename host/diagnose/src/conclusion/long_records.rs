@@ -100,9 +100,7 @@ fn validated(
     options: &Options,
     watch: &dyn Fn(Stage),
 ) -> Result<Option<Diagnosis>, DiagnoseError> {
-    let study = Study::new(case, beginnings)?;
-    let mut diagnosis = conclude::conclude(&study, beginnings, options, watch);
-    drop(study);
+    let mut diagnosis = conclude::of_records(case, beginnings, options, watch)?;
     watch(Stage::Records);
     let baseline = Residual::of(case, rest)?;
     let searched_s = beginnings

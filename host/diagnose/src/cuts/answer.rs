@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use quietcut_numerics::eigenvalues::of_symmetric;
 
 use super::candidate::Candidate;
@@ -14,7 +14,9 @@ use crate::candidates::cause::Location;
 use crate::conclusion::answer::{
     Diagnosis, EstimatedCause, Figure, Gain, NINETY_PERCENT, Outcome, Quality, Unexplained,
 };
+use crate::conclusion::updates::Posterior;
 use quietcut_recording::Recording;
+use quietcut_stability::Variable;
 
 /// Difference of two log evidences up to which two sets of effects explain records equally well: odds of 20.
 const EQUIVALENT: f64 = 3.0;
@@ -42,14 +44,21 @@ pub(super) fn answer(
         excess(last) / excess(baseline).max(f64::MIN_POSITIVE)
     };
     let explained = best.filter(|_| left <= LEFT_BY_CAUSE);
+    let written = explanations.written.as_ref().unwrap_or(baseline);
+    let posterior = posterior(explained.unwrap_or(baseline));
+    let updates = posterior.as_ref().map_or_else(Vec::new, Posterior::updates);
     let mut diagnosis = Diagnosis {
         outcome: if left > 0.0 && explained.is_none() {
             Outcome::Unexplained
-        } else {
+        } else if updates.is_empty() {
             Outcome::None
+        } else {
+            Outcome::Update
         },
-        baseline: quality(baseline, records),
+        baseline: quality(written, records),
         causes: Vec::new(),
+        updates,
+        posterior,
         equivalent: Vec::new(),
         extended: None,
         gain: None,
@@ -68,18 +77,39 @@ pub(super) fn answer(
         warnings: Vec::new(),
         explanations: Vec::new(),
         acting: 0,
-        views: views::views(baseline, explained, records, recordings),
+        views: Vec::new(),
     };
     if let Some(best) = explained {
         name_causes(&mut diagnosis, explanations, best);
-        diagnosis.extended = Some(quality(best, records));
-        let count = best.fit.residual.len() as f64;
-        diagnosis.gain = Some(Gain::new(baseline.fit.left, best.fit.left, count));
     }
+    let extended = explained.or((diagnosis.outcome == Outcome::Update).then_some(baseline));
+    if let Some(extended) = extended {
+        diagnosis.extended = Some(quality(extended, records));
+        let count = extended.fit.residual.len() as f64;
+        diagnosis.gain = Some(Gain::new(written.fit.left, extended.fit.left, count));
+    }
+    diagnosis.views = views::views(written, extended, records, recordings);
     diagnosis
 }
 
-/// Prediction error of the orders but 0, with the uncertain parameters fitted.
+/// The parameters that the case states as uncertain, after the records.
+fn posterior(explanation: &Explanation<'_>) -> Option<Posterior> {
+    let space = &explanation.space;
+    let case = space.baseline.case;
+    if !case.is_uncertain() {
+        return None;
+    }
+    let (places, variables): (Vec<usize>, Vec<Variable>) = space
+        .of_case()
+        .map(|(number, variable)| (number, variable.clone()))
+        .unzip();
+    let covariance = explanation.fit.covariance()?;
+    let own = covariance.select_rows(&places).select_columns(&places);
+    let z = DVector::from_iterator(places.len(), places.iter().map(|place| explanation.fit.z[*place]));
+    Posterior::new(case, &variables, &z, &own)
+}
+
+/// Prediction error of the orders but 0.
 fn quality(explanation: &Explanation<'_>, records: &[ReducedCut]) -> Quality {
     let shares: Vec<f64> = explanation
         .fit

@@ -4,10 +4,13 @@ use std::f64::consts::TAU;
 
 use crate::baseline::cubic_term::cubic_term;
 use crate::error::DiagnoseError;
+use crate::motion::recorded_cut::cut_of;
+use crate::orders::reduction::Orders;
 use quietcut_model::case::Case;
 use quietcut_model::effects::{EffectError, EffectName};
 use quietcut_model::milling::Cut;
 use quietcut_model::{Cutter, Effects, ModelError};
+use quietcut_recording::Recording;
 use quietcut_stability::cut_orbit::CutModel;
 
 /// Speed, depth, feed and engagement of a recorded cut.
@@ -21,6 +24,30 @@ pub(crate) struct Conditions {
     pub cut: Cut,
     /// Time, s from the start of the record, at which wear and drift are evaluated.
     pub time_s: f64,
+}
+
+impl Conditions {
+    /// Those of a recorded cut, in the middle of its reduced part.
+    ///
+    /// # Errors
+    /// The sidecar lacks the axial depth, or the case a cut.
+    pub(super) fn of_record(
+        case: &Case,
+        recording: &Recording,
+        orders: &Orders,
+    ) -> Result<Self, DiagnoseError> {
+        let given = recording.sidecar.cut.unwrap_or_default();
+        let depth_mm = given.axial_depth_mm.ok_or_else(|| {
+            recording.lacks("axial_depth_mm under [cut] in its sidecar (.toml), the axial depth of the cut")
+        })?;
+        let edges_s = orders.angle.edges_s();
+        Ok(Self {
+            spindle_hz: orders.angle.frequency_hz,
+            depth_m: 1e-3 * depth_mm,
+            cut: cut_of(case, recording)?,
+            time_s: 0.5 * (edges_s[0] + edges_s[orders.angle.count()]),
+        })
+    }
 }
 
 /// The machine of `case` with further effects in a cut.

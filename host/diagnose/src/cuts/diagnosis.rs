@@ -1,11 +1,11 @@
 //! Diagnosis of records that are all stable cuts.
 
 use super::answer::answer;
-use super::contradictions::contradiction;
+use super::contradictions::{contradiction, unit_of_gain};
 use super::record::ReducedCut;
 use super::selection::explain;
 use crate::baseline::Baseline;
-use crate::conclusion::answer::Diagnosis;
+use crate::conclusion::answer::{Diagnosis, Outcome};
 use crate::error::DiagnoseError;
 use crate::motion::spindle_motion::{SpindleMotion, speed_modulation};
 use crate::progress::Stage;
@@ -19,9 +19,13 @@ const CHATTER: f64 = 0.2;
 /// Root mean square of a modulation of the speed over that of all its wander from which on it is the modulation, and
 /// not one of the frequencies of a wandering speed.
 const MODULATED: f64 = 0.8;
+/// The same of a modulation of fewer periods than [`FEW_PERIODS`] over the longest record: a speed that wanders looks like one, but for
+/// what it has of higher frequencies.
+const MODULATED_SLOWLY: f64 = 0.99;
+const FEW_PERIODS: f64 = 3.0;
 
-/// The diagnosis of records that are all cuts with a steady forced motion, which its orders explain; `None` for other
-/// records: those in chatter, those whose speed is modulated, and those whose orders are left unexplained.
+/// The diagnosis of records that are all cuts with a steady forced motion; `None` for other records: those in chatter, and those
+/// whose speed is modulated.
 ///
 /// # Errors
 /// The case cannot be simulated, or contradicts a record.
@@ -40,21 +44,30 @@ pub(crate) fn diagnosed(
     let mut records = Vec::with_capacity(recordings.len());
     let mut motions = Vec::with_capacity(recordings.len());
     for recording in recordings {
-        let (Ok(record), Ok(motion)) = (
-            ReducedCut::new(&baseline, recording),
-            SpindleMotion::new(recording, None),
-        ) else {
-            return Ok(None);
+        let record = match (ReducedCut::new(&baseline, recording), recording.channel("tacho")) {
+            (Ok(record), _) => record,
+            (Err(_), Some(_)) => return Ok(None),
+            // No other way reads a cut without tachometer.
+            (Err(error), None) => return Err(error),
         };
         records.push(record);
-        motions.push(motion);
+        motions.extend(SpindleMotion::new(recording, None).ok());
     }
     let is_modulated = speed_modulation(&motions.iter().collect::<Vec<_>>()).is_some_and(|modulation| {
         let wander = records
             .iter()
             .map(|record| record.orders.angle.speed_wander)
             .fold(0.0, f64::max);
-        modulation.fluctuation.delta / 2.0_f64.sqrt() > MODULATED * wander
+        let longest_s = recordings
+            .iter()
+            .map(|recording| recording.len() as f64 / recording.sample_rate_hz)
+            .fold(0.0, f64::max);
+        let least = if modulation.fluctuation.frequency_hz * longest_s < FEW_PERIODS {
+            MODULATED_SLOWLY
+        } else {
+            MODULATED
+        };
+        modulation.fluctuation.delta / 2.0_f64.sqrt() > least * wander
     });
     if is_modulated || records.iter().any(|record| record.chatters(CHATTER)) {
         return Ok(None);
@@ -68,5 +81,10 @@ pub(crate) fn diagnosed(
     };
     watch(Stage::Answer);
     let diagnosis = answer(&explanations, &records, recordings);
-    Ok((diagnosis.unexplained.fraction == 0.0).then_some(diagnosis))
+    if diagnosis.outcome == Outcome::Cause
+        && let Some(error) = unit_of_gain(&diagnosis.causes, recordings)
+    {
+        return Err(error);
+    }
+    Ok(Some(diagnosis))
 }

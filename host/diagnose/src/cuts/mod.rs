@@ -26,6 +26,7 @@ mod fit;
 mod jumps;
 mod machine;
 mod moment;
+mod no_tachometer;
 mod reading;
 mod record;
 mod restoring_candidates;

@@ -10,11 +10,11 @@ use super::amplitude_errors::AmplitudeErrors;
 use super::conditions::Conditions;
 use super::jumps::OfJumps;
 use super::machine::Machine;
+use super::no_tachometer;
 use super::scatter;
 use super::wander;
 use crate::baseline::{Baseline, derivatives};
 use crate::error::DiagnoseError;
-use crate::motion::recorded_cut::cut_of;
 use crate::orders::circle::Circle;
 use crate::orders::reduction::{Orders, ReductionSettings};
 use crate::orders::spindle_angle::SpindleAngle;
@@ -60,10 +60,6 @@ impl ReducedCut {
     /// # Errors
     /// The recording lacks a channel or a value of the cut, or is too short; or the baseline has an undamped mode at an order.
     pub(crate) fn new(baseline: &Baseline<'_>, recording: &Recording) -> Result<Self, DiagnoseError> {
-        let given = recording.sidecar.cut.unwrap_or_default();
-        let depth_mm = given.axial_depth_mm.ok_or_else(|| {
-            recording.lacks("axial_depth_mm under [cut] in its sidecar (.toml), the axial depth of the cut")
-        })?;
         let names: Vec<&str> = recording
             .channels
             .iter()
@@ -77,25 +73,25 @@ impl ReducedCut {
             .collect();
         let duration_s = recording.len() as f64 / recording.sample_rate_hz;
         let settled_s = (SETTLED_DECAYS * baseline.slowest_decay_s()).min(SETTLED_SHARE * duration_s);
-        let angle = SpindleAngle::new(recording, settled_s)?;
         let [least, most] = ALIAS_FACTOR;
-        let settings = ReductionSettings {
+        let settings = |revolutions: f64| ReductionSettings {
             highest_hz: f64::INFINITY,
-            alias_factor: (ALIASED_CELLS * angle.count() as f64).clamp(least, most),
+            alias_factor: (ALIASED_CELLS * revolutions).clamp(least, most),
             slowest_decay_s: baseline.slowest_decay_s(),
             settled_s,
         };
+        let angle = match recording.channel("tacho") {
+            Some(_) => SpindleAngle::new(recording, settled_s)?,
+            None => {
+                let rpm = recording.sidecar.cut.and_then(|cut| cut.spindle_rpm);
+                let revolutions = (duration_s - settled_s) * rpm.unwrap_or_default() / 60.0;
+                no_tachometer::spindle_angle(baseline, recording, &names, &settings(revolutions.floor()))?
+            }
+        };
+        let settings = settings(angle.count() as f64);
         let orders = Orders::with_angle(recording, &names, angle, &settings)?;
         let samples = Sampled::new(recording, &orders);
-        let conditions = Conditions {
-            spindle_hz: orders.angle.frequency_hz,
-            depth_m: 1e-3 * depth_mm,
-            cut: cut_of(baseline.case, recording)?,
-            time_s: {
-                let edges_s = orders.angle.edges_s();
-                0.5 * (edges_s[0] + edges_s[orders.angle.count()])
-            },
-        };
+        let conditions = Conditions::of_record(baseline.case, recording, &orders)?;
         let rate_hz = recording.sample_rate_hz;
         let no_orders = || {
             DiagnoseError::record(

@@ -31,6 +31,8 @@ pub(crate) struct Explanation<'a> {
 
 /// The explanations of a study.
 pub(crate) struct Explanations<'a> {
+    /// The baseline as its case has it; `None` if the case states no uncertainty.
+    pub written: Option<Explanation<'a>>,
     /// The baseline within its uncertainty.
     pub baseline: Explanation<'a>,
     /// The sets of the last number of effects that gained, by descending evidence.
@@ -43,7 +45,13 @@ pub(crate) fn explain<'a>(baseline: &'a Baseline<'a>, records: &[ReducedCut]) ->
     let start = vec![0.0; space.variables.len()];
     let fitted = fit(&space, records, start, None)?;
     let all = candidates::all(baseline, records, &fitted);
+    let written = baseline
+        .case
+        .is_uncertain()
+        .then(|| as_written(&space, records))
+        .flatten();
     let mut first = Explanations {
+        written,
         baseline: Explanation {
             evidence: fitted.evidence(),
             space,
@@ -73,6 +81,17 @@ pub(crate) fn explain<'a>(baseline: &'a Baseline<'a>, records: &[ReducedCut]) ->
         first.ranked = vec![fewer];
     }
     Some(first)
+}
+
+/// The baseline with the parameters that its case has.
+fn as_written<'a>(space: &Space<'a>, records: &[ReducedCut]) -> Option<Explanation<'a>> {
+    let space = space.as_written();
+    let fit = fit(&space, records, vec![0.0; space.variables.len()], None)?;
+    Some(Explanation {
+        evidence: fit.evidence(),
+        space,
+        fit,
+    })
 }
 
 /// The best set without one of its effects, if that effect does not gain beside the others: a later effect may have taken

@@ -3,6 +3,8 @@
 //!
 //! Every variable is standard normal before the records are seen. Zero is the baseline.
 
+use nalgebra::DVector;
+
 use super::candidate::Candidate;
 use super::conditions::{Conditions, cut_model};
 use super::machine::Machine;
@@ -13,6 +15,7 @@ use crate::error::DiagnoseError;
 use quietcut_model::case::{Case, Deviation, Parameter};
 use quietcut_model::effects::EffectName;
 use quietcut_model::{Effects, ModelError};
+use quietcut_stability::Variable as CaseVariable;
 
 /// Standard deviation of a parameter of a case that states none, relative to its value: the case is taken as exact to
 /// the last digit that a case file usually has.
@@ -28,8 +31,8 @@ pub(crate) const ASSUMED_DELAY: f64 = 0.02;
 /// One variable.
 #[derive(Clone, Debug)]
 pub(crate) enum Variable {
-    /// Parameters of the case, which change by these standard deviations per unit.
-    Baseline(Vec<Deviation>),
+    /// Parameters of the case that vary together.
+    Baseline(CaseVariable),
     /// Gain of a channel, in all records.
     Gain(String),
     /// Delay of a channel, in all records.
@@ -166,19 +169,41 @@ impl<'a> Space<'a> {
         }
     }
 
+    /// This space with the parameters of the case as it states them.
+    pub(crate) fn as_written(&self) -> Self {
+        let is_baseline = |variable: &&Variable| matches!(variable, Variable::Baseline(_));
+        Self {
+            baseline: self.baseline,
+            candidates: self.candidates.clone(),
+            variables: self
+                .variables
+                .iter()
+                .filter(|variable| !is_baseline(variable))
+                .cloned()
+                .collect(),
+        }
+    }
+
+    /// Variables of the case with their numbers.
+    pub(crate) fn of_case(&self) -> impl Iterator<Item = (usize, &CaseVariable)> {
+        self.variables
+            .iter()
+            .enumerate()
+            .filter_map(|(number, variable)| match variable {
+                Variable::Baseline(variable) => Some((number, variable)),
+                _ => None,
+            })
+    }
+
     /// The case at a point of the space.
     fn case(&self, z: &[f64]) -> Option<Case> {
+        let (variables, at): (Vec<CaseVariable>, Vec<f64>) = self
+            .of_case()
+            .map(|(number, variable)| (variable.clone(), z[number]))
+            .filter(|(_, z)| *z != 0.0)
+            .unzip();
         let mut case = self.baseline.case.clone();
-        for (variable, z) in self.variables.iter().zip(z) {
-            let Variable::Baseline(parts) = variable else {
-                continue;
-            };
-            let is_possible = |part: &Deviation| *z == 0.0 || part.parameter.shift(&mut case, z * part.std);
-            if !parts.iter().all(is_possible) {
-                return None;
-            }
-        }
-        Some(case)
+        CaseVariable::shift_all(&variables, &DVector::from_vec(at), &mut case).then_some(case)
     }
 
     /// Effects of the candidates at a point of the space.
@@ -262,17 +287,11 @@ impl<'a> Space<'a> {
     }
 }
 
-/// Independent uncertain combinations of the parameters of a case: those that it states, otherwise each parameter of the
-/// structure and the material by [`ASSUMED_PARAMETER`].
-fn uncertain(case: &Case) -> Vec<Vec<Deviation>> {
+/// Independent variables of a case: those that it states, otherwise each parameter of the structure and the material by
+/// [`ASSUMED_PARAMETER`].
+fn uncertain(case: &Case) -> Vec<CaseVariable> {
     if case.is_uncertain() {
-        let mut all: Vec<Vec<Deviation>> = case.deviations.iter().map(|deviation| vec![*deviation]).collect();
-        all.extend(
-            case.covariance
-                .iter()
-                .flat_map(|covariance| covariance.independent_parts()),
-        );
-        return all;
+        return CaseVariable::of_case(case);
     }
     let is_assumed = |parameter: &Parameter| {
         !matches!(
@@ -291,10 +310,10 @@ fn uncertain(case: &Case) -> Vec<Vec<Deviation>> {
         .filter_map(|parameter| {
             let value = parameter.value(case)?;
             (value != 0.0).then(|| {
-                vec![Deviation {
+                CaseVariable::together(vec![Deviation {
                     parameter,
                     std: ASSUMED_PARAMETER * value.abs(),
-                }]
+                }])
             })
         })
         .collect()

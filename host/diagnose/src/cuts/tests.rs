@@ -10,13 +10,17 @@ use super::record::ReducedCut;
 use super::selection::{Explanation, explain};
 use crate::baseline::Baseline;
 use crate::tests::cutting::{case, records};
+use quietcut_recording::Recording;
 use quietcut_testkit::slice;
 
 /// Names of the effects of the best explanation of two virtual cuts, and χ² per value that the baseline and it leave.
 fn explained(effects: &[&str]) -> (Vec<&'static str>, [f64; 2]) {
+    explained_in(&records(effects, true, 7), effects)
+}
+
+fn explained_in(recordings: &[Recording], effects: &[&str]) -> (Vec<&'static str>, [f64; 2]) {
     let baseline_case = case("0.15", "");
     let baseline = Baseline::new(&baseline_case).unwrap();
-    let recordings = records(effects, true, 7);
     let reduced: Vec<ReducedCut> = recordings
         .iter()
         .map(|recording| ReducedCut::new(&baseline, recording).unwrap())
@@ -71,6 +75,33 @@ fn effects_far_from_the_baseline_and_below_the_noise_of_a_sample_are_explained()
         let (names, [baseline, best]) = explained(effects);
         assert_eq!(names, expected, "{effects:?}: {baseline} {best}");
         // χ² of 840 values per value: 1 ± 0.05, somewhat below since the variables are fitted.
+        assert!(best < 1.15, "{effects:?}: {best}");
+    }
+}
+
+#[test]
+fn cuts_without_tachometer_are_explained() {
+    let hidden: [(&[&str], &[&str]); 5] = [
+        (&[], &[]),
+        (&["force-coefficients=0.2"], &["force-coefficients"]),
+        (&["runout=20", "runout.angle_deg=40"], &["runout"]),
+        (&["mass=0.15", "mass.direction=y"], &["mass"]),
+        // A speed that wanders by 0.3 %, slowly against the structure, is followed.
+        (
+            &["speed-fluctuation=0.003", "speed-fluctuation.frequency_hz=0.4"],
+            &[],
+        ),
+    ];
+    for (effects, expected) in hidden {
+        let mut recordings = records(effects, true, 7);
+        for recording in &mut recordings {
+            recording.channels.retain(|channel| channel.name != "tacho");
+            let cut = recording.sidecar.cut.as_mut().unwrap();
+            // A machine shows its speed to some parts in a thousand.
+            cut.spindle_rpm = cut.spindle_rpm.map(|rpm| 1.003 * rpm);
+        }
+        let (names, [baseline, best]) = explained_in(&recordings, effects);
+        assert_eq!(names, expected, "{effects:?}: {baseline} {best}");
         assert!(best < 1.15, "{effects:?}: {best}");
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use crate::fit::regression::Fit;
 use crate::records::record::Clean;
@@ -42,9 +42,16 @@ pub(crate) struct Simulated {
     /// For each record: the fitted initial state of the simulation; empty for a start from rest. No entries in a study
     /// with a cut.
     pub starts: Vec<Vec<f64>>,
+    /// The uncertain parameters of the baseline with this model; `None` without such parameters.
+    pub baseline: Option<AfterRecords>,
+    /// Steps of the finite differences at the end of the fit, one for each free parameter; none in a study with a cut.
+    pub steps: Vec<f64>,
     /// Prediction of the records by the extended case in a study with a cut; otherwise `None`.
     pub reading: Option<Arc<ExtendedPrediction>>,
 }
+
+/// Uncertain parameters of the baseline after the records: values in standard deviations from the case, and their covariance.
+pub(crate) type AfterRecords = (DVector<f64>, DMatrix<f64>);
 
 /// Prediction of the records by an extended case.
 #[derive(Debug)]

@@ -1,6 +1,6 @@
 //! Fits of explanations in closed loop: the extended case moves as it would, and not along the motion that was measured.
 
-use crate::fit::candidate_model::CandidateModel;
+use crate::fit::candidate_model::{AfterRecords, CandidateModel};
 use crate::fit::library::Library;
 use crate::fit::regression::Regression;
 
@@ -33,6 +33,12 @@ pub(crate) trait ClosedFit {
         None
     }
 
+    /// The same explanation with the covariance of its parameters from differences that errors of the computation do not reach;
+    /// `None` where they are not differences.
+    fn with_covariance(&self, _library: &Library, _explanation: &CandidateModel) -> Option<CandidateModel> {
+        None
+    }
+
     /// The same explanation with the covariance that its parameters have where noise of the forces drives a machine that is not
     /// linear; `None` where that changes nothing.
     fn spread_by_force_noise(
@@ -43,8 +49,12 @@ pub(crate) trait ClosedFit {
         None
     }
 
-    /// What the case alone leaves, in units of the noise.
-    fn left_by_baseline(&self, library: &Library, regression: &Regression) -> Option<f64>;
+    /// What the case alone leaves, in units of the noise, and its uncertain parameters then.
+    fn left_by_baseline(
+        &self,
+        library: &Library,
+        regression: &Regression,
+    ) -> Option<(f64, Option<AfterRecords>)>;
 
     /// Measured less computed, by record and channel, of an explanation that was fitted so.
     fn left_of(&self, library: &Library, explanation: &CandidateModel) -> Option<Vec<Vec<Vec<f64>>>>;

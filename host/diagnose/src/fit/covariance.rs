@@ -1,10 +1,10 @@
 //! The covariance of the parameters of a candidate model that was fitted by linear regression.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use crate::fit::candidate_model::CandidateModel;
 use crate::fit::library::Library;
-use crate::fit::regression::{Regression, Subset};
+use crate::fit::regression::{Fit, Regression, Subset};
 use crate::records::domain::Domain;
 use crate::records::study::Study;
 
@@ -48,4 +48,38 @@ pub(crate) fn covariance(
             })
         })
         .collect()
+}
+
+impl Regression {
+    /// Covariance of the coefficients of a fit whose residual is not unit-variance noise, but an error of the equations
+    /// with an unknown spectrum: (XᵀX)⁻¹ Xᵀ diag(r²/(1 − h)²) X (XᵀX)⁻¹ with the regression columns X, the residual r
+    /// of the fit and h = diag(X (XᵀX)⁻¹ Xᵀ). The values of the spectrum are taken as independent of each other (HC3 of
+    /// MacKinnon and White, 1985).
+    pub(crate) fn covariance_by_residual(
+        &self,
+        subset: Subset,
+        columns: &[usize],
+        fit: &Fit,
+    ) -> DMatrix<f64> {
+        let mut middle = DMatrix::zeros(columns.len(), columns.len());
+        let of_subset = self
+            .segments
+            .iter()
+            .enumerate()
+            .filter(|(_, segment)| segment.subset == subset);
+        for (segment, _) in of_subset {
+            let residual = &self.residuals[segment];
+            let mut x = DMatrix::from_fn(residual.len(), columns.len(), |row, column| {
+                self.columns[columns[column]][segment][row]
+            });
+            let left =
+                DVector::from_column_slice(residual) - &x * DVector::from_column_slice(&fit.coefficients);
+            let leverage = (&x * &fit.covariance).component_mul(&x).column_sum();
+            for (mut row, (left, leverage)) in x.row_iter_mut().zip(left.iter().zip(leverage.iter())) {
+                row *= left / (1.0 - leverage.min(1.0 - f64::EPSILON));
+            }
+            middle += x.tr_mul(&x);
+        }
+        &fit.covariance * middle * &fit.covariance
+    }
 }

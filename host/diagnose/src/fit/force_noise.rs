@@ -24,6 +24,7 @@ use crate::criteria::LEAST_FORCE_NOISE_VARIANCE;
 use crate::fit::candidate_model::CandidateModel;
 use crate::fit::library::Library;
 use crate::fit::output_error::{OutputError, projected};
+use crate::fit::output_error_fit::place;
 use crate::fit::segment::{Segment, Subset};
 use crate::fit::unknowns::{FreeParameter, at_bounds, covariance};
 
@@ -59,9 +60,9 @@ impl OutputError<'_> {
             return None;
         }
         let (mut problem, mut point) = self.problem(library, model)?;
-        point.starts.clone_from(&simulated.starts);
-        let effects = problem.effects(self.study, &point)?;
-        if !self.closed.is_nonlinear(self.study, &effects) {
+        place(&mut point, simulated);
+        let extended = problem.extended(self.study, &point)?;
+        if !self.closed.is_nonlinear(self.study, &extended) {
             return None;
         }
         for (slot, step) in &mut problem.slots {

@@ -10,7 +10,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::candidates::closed_loop::{ClosedLoop, starts_anywhere};
+use crate::candidates::closed_loop::{ClosedLoop, Extended, starts_anywhere};
 use crate::fit::candidate_model::CandidateModel;
 use crate::fit::library::Library;
 use crate::fit::segment::{Nuisance, Segment, Subset, split};
@@ -18,7 +18,6 @@ use crate::fit::unknowns::{FitProblem, FreeParameter, ParameterPoint};
 use crate::motion::free_decay::Decays;
 use crate::records::study::Study;
 use crate::signal::dot::dot;
-use quietcut_simulate::Effects;
 
 /// Shares of each record, from its beginning, on which poor start values of the parameters are fitted first, one share
 /// after the other.
@@ -29,10 +28,24 @@ const HORIZONS: [f64; 2] = [0.12, 0.35];
 /// integration.
 pub(crate) const LEAST_STEP: f64 = 1e-7;
 
+/// Step of a finite difference for intervals, in conditional standard deviations of its parameter, as long as it is no larger than
+/// [`WIDE_STEP_SHARE`] of the parameter. An integration whose steps err by 1e-7 of the amplitude errs by some 1e-5 in all,
+/// which is 1e-3 of a noise of 1 %, or 0.2 standard deviations over 25 000 samples: a difference over one standard deviation is then off
+/// by a fifth, and two parameters of almost the same effect, as softening and exponent of a joint, seem better separated than they are.
+const WIDE_STEP: f64 = 30.0;
+
+/// A forward difference over this share of a parameter is off by about this share.
+const WIDE_STEP_SHARE: f64 = 1e-3;
+
+/// First step of an uncertain parameter of the baseline, in its standard deviations.
+const FIRST_STEP: f64 = 0.01;
+
 /// Smallest step of the finite difference by which a simulated response with dry friction is differentiated by a
 /// parameter of a cause, relative to the parameter. Accelerations jump when friction slips or sticks, and the time of a
 /// jump changes by whole samples: a step must shift it by many samples.
 const LEAST_STEP_OF_FRICTION: f64 = 3e-3;
+/// The same by an uncertain parameter of the baseline, in its standard deviations: as much of a parameter known to 3 %.
+const LEAST_BASELINE_STEP_OF_FRICTION: f64 = 0.1;
 
 /// Compares simulations of candidate models with the records of a study.
 pub(crate) struct OutputError<'a> {
@@ -103,7 +116,7 @@ impl<'a> OutputError<'a> {
         closed: &ClosedLoop,
         record: usize,
         segments: &[&Segment],
-        effects: &Effects,
+        extended: &Extended,
         start: &[f64],
     ) -> Option<Vec<f64>> {
         let of_record: Vec<&&Segment> = segments
@@ -113,7 +126,7 @@ impl<'a> OutputError<'a> {
         let Some(length) = of_record.iter().map(|segment| segment.range.end).max() else {
             return Some(Vec::new());
         };
-        let mut samples = closed.simulate(self.study, record, effects, start, length)?;
+        let mut samples = closed.simulate(self.study, record, extended, start, length)?;
         for (channel, samples) in self.study.records[record].channels.iter().zip(&mut samples) {
             for (simulated, measured) in samples.iter_mut().zip(&channel.measured) {
                 *simulated = measured - *simulated;
@@ -145,10 +158,10 @@ impl<'a> OutputError<'a> {
         segments: &[&Segment],
         point: &ParameterPoint,
     ) -> Option<Vec<Vec<f64>>> {
-        let effects = problem.effects(self.study, point)?;
+        let extended = problem.extended(self.study, point)?;
         (0..self.study.records.len())
             .into_par_iter()
-            .map(|record| self.residual(closed, record, segments, &effects, &point.starts[record]))
+            .map(|record| self.residual(closed, record, segments, &extended, &point.starts[record]))
             .collect()
     }
 
@@ -162,7 +175,7 @@ impl<'a> OutputError<'a> {
         point: &ParameterPoint,
         left: &[Vec<f64>],
     ) -> Option<Vec<Column>> {
-        let effects: Vec<Option<(Effects, ParameterPoint, f64)>> = problem
+        let extended: Vec<Option<(Extended, ParameterPoint, f64)>> = problem
             .slots
             .iter()
             .map(|(slot, step)| {
@@ -170,8 +183,8 @@ impl<'a> OutputError<'a> {
                 [*step, -step].into_iter().find_map(|step| {
                     let mut moved = point.clone();
                     *slot.of(&mut moved) += step;
-                    let effects = problem.effects(self.study, &moved)?;
-                    Some((effects, moved, step))
+                    let extended = problem.extended(self.study, &moved)?;
+                    Some((extended, moved, step))
                 })
             })
             .collect();
@@ -182,9 +195,9 @@ impl<'a> OutputError<'a> {
         tasks
             .into_par_iter()
             .map(|(record, slot)| {
-                let (effects, moved, step) = effects[slot].as_ref()?;
+                let (extended, moved, step) = extended[slot].as_ref()?;
                 let mut column =
-                    self.residual(&self.closed, record, segments, effects, &moved.starts[record])?;
+                    self.residual(&self.closed, record, segments, extended, &moved.starts[record])?;
                 for (column, left) in column.iter_mut().zip(&left[record]) {
                     *column = (left - *column) / step;
                 }
@@ -193,7 +206,8 @@ impl<'a> OutputError<'a> {
             .collect()
     }
 
-    /// Computes Jᵀ J and Jᵀ r of the simulated candidate model from the Jacobian's `columns`, and adapts the steps of
+    /// Computes Jᵀ J and Jᵀ r of the simulated candidate model from the Jacobian's `columns`, with what the case states of uncertain
+    /// parameters, and adapts the steps of
     /// the finite differences so that, within limits, each step changes χ² by about one near its minimum.
     pub(crate) fn normal(
         &self,
@@ -204,7 +218,7 @@ impl<'a> OutputError<'a> {
     ) -> (DMatrix<f64>, DVector<f64>) {
         let size = problem.slots.len();
         let mut normal = DMatrix::<f64>::zeros(size, size);
-        let gradient = projected(columns, size, left);
+        let mut gradient = projected(columns, size, left);
         for (index, (record, slot, column)) in columns.iter().enumerate() {
             for (_, other, second) in columns[..=index]
                 .iter()
@@ -218,11 +232,17 @@ impl<'a> OutputError<'a> {
                 }
             }
         }
+        for (index, (slot, _)) in problem.slots.iter().enumerate() {
+            if let FreeParameter::Baseline(variable) = slot {
+                normal[(index, index)] += 1.0;
+                gradient[index] -= point.baseline[*variable];
+            }
+        }
         for (index, (slot, step)) in problem.slots.iter_mut().enumerate() {
             let value = slot.of(&mut point.clone()).abs();
             let least = match slot {
                 FreeParameter::Inner { .. } => problem.least_step,
-                FreeParameter::Start { .. } => LEAST_STEP,
+                FreeParameter::Baseline(_) | FreeParameter::Start { .. } => LEAST_STEP,
             };
             let natural = normal[(index, index)].sqrt().recip();
             let most = match slot {
@@ -237,8 +257,24 @@ impl<'a> OutputError<'a> {
                     .min(most)
                     .max(least * value);
             }
+            if let FreeParameter::Baseline(_) = slot {
+                *step = step.max(problem.least_baseline_step);
+            }
         }
         (normal, gradient)
+    }
+
+    /// Widens the steps of the parameters of causes and of the baseline to [`WIDE_STEP`] standard deviations where that is little
+    /// beside the parameter.
+    pub(crate) fn widen_steps(problem: &mut FitProblem<'_>, point: &ParameterPoint) {
+        for (slot, step) in &mut problem.slots {
+            let widest = match slot {
+                FreeParameter::Baseline(_) => FIRST_STEP,
+                FreeParameter::Inner { .. } => WIDE_STEP_SHARE * slot.of(&mut point.clone()).abs(),
+                FreeParameter::Start { .. } => continue,
+            };
+            *step = step.max((WIDE_STEP * *step).min(widest));
+        }
     }
 
     /// The free parameters of a candidate model and their start values from its linear regression; `None` if the start
@@ -281,26 +317,31 @@ impl<'a> OutputError<'a> {
             }
             inner.push(coefficients.iter().chain(nonlinear_parameters).copied().collect());
         }
+        let uncertain = &self.study.uncertain;
+        slots.extend((0..uncertain.len()).map(|index| (FreeParameter::Baseline(index), FIRST_STEP)));
         let mut problem = FitProblem {
             library,
             choices: &model.choices,
             slots,
             least_step: LEAST_STEP,
+            least_baseline_step: 0.0,
         };
         let mut point = ParameterPoint {
+            baseline: uncertain.at.clone(),
             inner,
             starts: vec![Vec::new(); self.study.records.len()],
         };
-        let effects = problem.effects(self.study, &point)?;
-        if self.closed.holds(self.study, &effects)? {
+        let extended = problem.extended(self.study, &point)?;
+        if self.closed.holds(self.study, &extended)? {
             problem.least_step = LEAST_STEP_OF_FRICTION;
+            problem.least_baseline_step = LEAST_BASELINE_STEP_OF_FRICTION;
         }
         for (record, start) in point.starts.iter_mut().enumerate() {
             if !starts_anywhere(&self.study.records[record]) {
                 continue;
             }
             let state = self.state_at_start(library, model, record);
-            let (states, sizes) = self.closed.begin(self.study, record, &effects, &state)?;
+            let (states, sizes) = self.closed.begin(self.study, record, &extended, &state)?;
             let amplitude = states
                 .iter()
                 .zip(&sizes)

@@ -4,13 +4,18 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::criteria::{FAR_BEHIND, FAR_START};
-use crate::fit::candidate_model::{CandidateModel, Simulated};
+use crate::fit::candidate_model::{AfterRecords, CandidateModel, Simulated};
 use crate::fit::closed_fit::ClosedFit;
 use crate::fit::library::Library;
 use crate::fit::output_error::OutputError;
 use crate::fit::regression::{Fit, Regression, Subset};
 use crate::fit::search::ROUNDS;
-use crate::fit::unknowns::{FreeParameter, SearchResult, by_choice, energy};
+use crate::fit::unknowns::{
+    FreeParameter, ParameterPoint, SearchResult, at_bounds, by_choice, energy, of_baseline,
+};
+
+/// Largest number of iterations for the initial states of the baseline.
+const BASELINE_ROUNDS: usize = 6;
 
 impl OutputError<'_> {
     fn accept(
@@ -20,6 +25,7 @@ impl OutputError<'_> {
         model: &CandidateModel,
         found: SearchResult,
         covariance: Vec<DMatrix<f64>>,
+        (baseline, steps): (Option<AfterRecords>, Vec<f64>),
     ) -> Option<CandidateModel> {
         let mut next = model.clone();
         let mut coefficients = Vec::new();
@@ -41,6 +47,8 @@ impl OutputError<'_> {
         next.simulated = Some(Simulated {
             covariance,
             starts: found.point.starts,
+            baseline,
+            steps,
             reading: None,
         });
         Some(next)
@@ -59,7 +67,7 @@ impl ClosedFit for OutputError<'_> {
         let (mut problem, start) = self.problem(library, model)?;
         let guess = self
             .residuals(&problem, &whole, &start)
-            .map_or(f64::INFINITY, |left| energy(&left));
+            .map_or(f64::INFINITY, |left| energy(&left, &start));
         let mut start = start;
         let by_regression = model.fit.left + regression.count(Subset::Whole) as f64;
         if guess > FAR_START * by_regression
@@ -72,14 +80,44 @@ impl ClosedFit for OutputError<'_> {
         let found = self.restarted(&mut problem, &whole, &start, found, (rival, count));
         let slots: Vec<FreeParameter> = problem.slots.iter().map(|(slot, _)| *slot).collect();
         let covariance = by_choice(&slots, &found);
-        self.accept(library, regression, model, found, covariance)
+        let baseline = of_baseline(&slots, &found);
+        let steps = problem.slots.iter().map(|(_, step)| *step).collect();
+        self.accept(library, regression, model, found, covariance, (baseline, steps))
+    }
+
+    fn with_covariance(&self, library: &Library, model: &CandidateModel) -> Option<CandidateModel> {
+        let simulated = model.simulated.as_ref()?;
+        let (mut problem, mut point) = self.problem(library, model)?;
+        place(&mut point, simulated);
+        let whole = self.of_subset(Subset::Whole);
+        let left = self.residuals(&problem, &whole, &point)?;
+        for ((_, step), known) in problem.slots.iter_mut().zip(&simulated.steps) {
+            *step = *known;
+        }
+        Self::widen_steps(&mut problem, &point);
+        let columns = self.columns(&problem, &whole, &point, &left)?;
+        let (mut normal, mut gradient) = self.normal(&mut problem, &columns, &point, &left);
+        at_bounds(&problem, &point, &mut normal, &mut gradient);
+        let slots: Vec<FreeParameter> = problem.slots.iter().map(|(slot, _)| *slot).collect();
+        let found = SearchResult {
+            point,
+            left: model.fit.left,
+            normal,
+        };
+        let mut next = model.clone();
+        next.simulated = Some(Simulated {
+            covariance: by_choice(&slots, &found),
+            baseline: of_baseline(&slots, &found),
+            ..simulated.clone()
+        });
+        Some(next)
     }
 
     fn spread_by_force_noise(&self, library: &Library, model: &CandidateModel) -> Option<CandidateModel> {
         self.spread(library, model)
     }
 
-    fn left_by_baseline(&self, library: &Library, _: &Regression) -> Option<f64> {
+    fn left_by_baseline(&self, library: &Library, _: &Regression) -> Option<(f64, Option<AfterRecords>)> {
         let nothing = CandidateModel {
             choices: Vec::new(),
             fit: Fit {
@@ -90,16 +128,25 @@ impl ClosedFit for OutputError<'_> {
             parameter_count: 0,
             simulated: None,
         };
-        let (mut problem, point) = self.problem(library, &nothing)?;
+        let (mut problem, mut point) = self.problem(library, &nothing)?;
+        point.baseline.clone_from(&self.study.uncertain.nearest);
         let whole = self.of_subset(Subset::Whole);
-        let found = self.search(&mut problem, &whole, point, 6, f64::INFINITY)?;
-        Some(found.left)
+        // Candidate models fit the uncertain parameters with all their iterations: so does what they are compared with.
+        let rounds = if self.study.uncertain.len() > 0 {
+            ROUNDS
+        } else {
+            BASELINE_ROUNDS
+        };
+        let found = self.search(&mut problem, &whole, point, rounds, f64::INFINITY)?;
+        let slots: Vec<FreeParameter> = problem.slots.iter().map(|(slot, _)| *slot).collect();
+        Some((found.left, of_baseline(&slots, &found)))
     }
 
     fn left_of(&self, library: &Library, model: &CandidateModel) -> Option<Vec<Vec<Vec<f64>>>> {
         let simulated = model.simulated.as_ref()?;
-        let (problem, point) = self.problem(library, model)?;
-        let effects = problem.effects(self.study, &point)?;
+        let (problem, mut point) = self.problem(library, model)?;
+        place(&mut point, simulated);
+        let extended = problem.extended(self.study, &point)?;
         self.study
             .records
             .par_iter()
@@ -107,7 +154,7 @@ impl ClosedFit for OutputError<'_> {
             .map(|(index, record)| {
                 let count = record.grid.count();
                 let start = &simulated.starts[index];
-                let samples = self.closed.simulate(self.study, index, &effects, start, count)?;
+                let samples = self.closed.simulate(self.study, index, &extended, start, count)?;
                 let left = record.channels.iter().zip(samples).map(|(channel, samples)| {
                     channel
                         .measured
@@ -124,7 +171,7 @@ impl ClosedFit for OutputError<'_> {
     fn left_held_out(&self, library: &Library, _: &Regression, model: &CandidateModel) -> Option<f64> {
         let simulated = model.simulated.as_ref()?;
         let (mut problem, mut point) = self.problem(library, model)?;
-        point.starts.clone_from(&simulated.starts);
+        place(&mut point, simulated);
         let fitted = self.of_subset(Subset::Fitted);
         let found = self.search(&mut problem, &fitted, point, 4, f64::INFINITY)?;
         // The initial states of held-out records have no influence on the fitted segments, and are fitted to the
@@ -132,10 +179,18 @@ impl ClosedFit for OutputError<'_> {
         let held_out = self.of_subset(Subset::HeldOut);
         let only_here = |slot: &FreeParameter| match slot {
             FreeParameter::Start { record, .. } => !fitted.iter().any(|segment| segment.record == *record),
-            FreeParameter::Inner { .. } => false,
+            FreeParameter::Baseline(_) | FreeParameter::Inner { .. } => false,
         };
         problem.slots.retain(|(slot, _)| only_here(slot));
         let found = self.search(&mut problem, &held_out, found.point, 4, f64::INFINITY)?;
         Some(found.left)
+    }
+}
+
+/// Puts initial states and uncertain parameters of the baseline where a fit has found them.
+pub(crate) fn place(point: &mut ParameterPoint, simulated: &Simulated) {
+    point.starts.clone_from(&simulated.starts);
+    if let Some((baseline, _)) = &simulated.baseline {
+        point.baseline.clone_from(baseline);
     }
 }

@@ -68,6 +68,8 @@ impl Relinearization<'_> {
         at.simulated = Some(Simulated {
             covariance: by_choice(library, &at, &shapes, &slopes.covariance),
             starts: Vec::new(),
+            baseline: None,
+            steps: Vec::new(),
             reading: Some(now),
         });
         Some(at)

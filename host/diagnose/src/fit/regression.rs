@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use crate::criteria::RELATIVE_ERROR_OF_CUTS;
 use crate::fit::normal_equations::{Products, products};
+use crate::fit::nuisances::Nuisances;
 pub(crate) use crate::fit::segment::Subset;
 use crate::fit::segment::{Nuisance, Segment, split};
 use crate::records::study::Study;
@@ -48,10 +49,10 @@ pub(crate) struct Refit {
 
 /// The residuals and regression columns of a study, whitened and by segment.
 pub(crate) struct Regression {
-    segments: Vec<Segment>,
+    pub(super) segments: Vec<Segment>,
     /// Whitened regression columns: by column and segment, the values of the whitened segment.
-    columns: Vec<Vec<Vec<f64>>>,
-    residuals: Vec<Vec<f64>>,
+    pub(super) columns: Vec<Vec<Vec<f64>>>,
+    pub(super) residuals: Vec<Vec<f64>>,
     /// Inner products of the regression columns over the fitted segments, over the held-out segments and over the whole
     /// records, in this order: that of [`Subset`].
     products: [Products; 3],
@@ -59,6 +60,8 @@ pub(crate) struct Regression {
     complete: usize,
     /// Ridge added to the unit diagonal of the scaled normal equations of fits of few regression columns.
     ridge: f64,
+    /// Uncertain parameters of the baseline, which are fitted with every set of columns; `None` without any.
+    nuisances: Option<Nuisances>,
 }
 
 impl Regression {
@@ -84,7 +87,9 @@ impl Regression {
             } else {
                 ROUNDING
             },
+            nuisances: None,
         };
+        regression.nuisances = Nuisances::new(study, &regression.segments);
         regression.sum();
         regression
     }
@@ -99,6 +104,12 @@ impl Regression {
             products.residual += dot(residual, residual);
             products.count += residual.len() - segment.taken();
         }
+        if let Some(nuisances) = &mut self.nuisances {
+            nuisances.start(&self.segments, &self.residuals);
+            for (products, residual) in self.products.iter_mut().zip(nuisances.of_residual()) {
+                products.residual += residual;
+            }
+        }
         for column in 0..self.columns.len() {
             self.sum_column(column);
         }
@@ -111,6 +122,14 @@ impl Regression {
             let [square, with_residual] = &mut sums[segment.subset as usize];
             *square += dot(values, values);
             *with_residual += dot(values, residual);
+        }
+        if let Some(nuisances) = &mut self.nuisances {
+            nuisances.add(&self.segments, &self.columns[column]);
+            for (sums, taken) in sums.iter_mut().zip(nuisances.of_column(column)) {
+                for (sum, taken) in sums.iter_mut().zip(taken) {
+                    *sum -= taken;
+                }
+            }
         }
         for (products, [square, with_residual]) in self.products.iter_mut().zip(sums) {
             products.add(square, with_residual);
@@ -143,7 +162,9 @@ impl Regression {
         let least = left.iter().copied().fold(f64::INFINITY, f64::min).max(1.0);
         for (index, segment) in self.segments.iter_mut().enumerate() {
             segment.weight = (least / left[segment.record].max(least)).sqrt();
-            let values = self.columns.iter_mut().flat_map(|column| &mut column[index]);
+            let nuisances = self.nuisances.iter_mut().flat_map(Nuisances::columns_mut);
+            let columns = self.columns.iter_mut().chain(nuisances);
+            let values = columns.flat_map(|column| &mut column[index]);
             for value in values.chain(&mut self.residuals[index]) {
                 *value *= segment.weight;
             }
@@ -215,6 +236,13 @@ impl Regression {
         for (segment, rows) in self.segments.iter().zip(of_segments) {
             sums[segment.subset as usize] += rows;
         }
+        if let Some(nuisances) = &self.nuisances {
+            for (subset, rows) in sums.iter_mut().enumerate() {
+                *rows -= DMatrix::from_fn(size - first, size, |row, column| {
+                    nuisances.between(subset, first + row, column)
+                });
+            }
+        }
         for (products, rows) in self.products.iter_mut().zip(&sums) {
             products.complete(rows);
         }
@@ -235,10 +263,36 @@ impl Regression {
                 .iter()
                 .enumerate()
                 .filter(|(_, segment)| segment.subset == subset);
-            of_subset
+            let raw: f64 = of_subset
                 .map(|(index, _)| dot(&self.columns[i][index], &self.columns[j][index]))
-                .sum()
+                .sum();
+            let taken = self
+                .nuisances
+                .as_ref()
+                .map_or(0.0, |nuisances| nuisances.between(subset as usize, i, j));
+            raw - taken
         })
+    }
+
+    /// χ² of the baseline's residual and of its uncertain parameters as they are, and how much less a linear fit of these parameters
+    /// would leave.
+    pub(crate) fn at_baseline(&self) -> (f64, f64) {
+        let left = self.residual(Subset::Whole);
+        let promised = self
+            .nuisances
+            .as_ref()
+            .map_or(0.0, |nuisances| nuisances.promised(Subset::Whole as usize));
+        (left + promised, promised)
+    }
+
+    /// Change of the uncertain parameters of the baseline, from [`Uncertain::at`](crate::baseline::uncertain::Uncertain::at), with
+    /// the regression columns `columns` of a fit to the whole records, and their covariance; `None` without such parameters.
+    pub(crate) fn after(&self, columns: &[usize], fit: Option<&Fit>) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let nuisances = self.nuisances.as_ref()?;
+        let none = DMatrix::zeros(0, 0);
+        let (coefficients, covariance) =
+            fit.map_or((&[][..], &none), |fit| (&fit.coefficients[..], &fit.covariance));
+        Some(nuisances.after(Subset::Whole as usize, columns, coefficients, covariance))
     }
 
     fn products(&self, subset: Subset) -> &Products {
@@ -351,38 +405,6 @@ impl Regression {
             sum += dot(&residual, &residual);
         }
         sum
-    }
-
-    /// Covariance of the coefficients of a fit whose residual is not unit-variance noise, but an error of the equations
-    /// with an unknown spectrum: (XᵀX)⁻¹ Xᵀ diag(r²/(1 − h)²) X (XᵀX)⁻¹ with the regression columns X, the residual r
-    /// of the fit and h = diag(X (XᵀX)⁻¹ Xᵀ). The values of the spectrum are taken as independent of each other (HC3 of
-    /// MacKinnon and White, 1985).
-    pub(crate) fn covariance_by_residual(
-        &self,
-        subset: Subset,
-        columns: &[usize],
-        fit: &Fit,
-    ) -> DMatrix<f64> {
-        let mut middle = DMatrix::zeros(columns.len(), columns.len());
-        let of_subset = self
-            .segments
-            .iter()
-            .enumerate()
-            .filter(|(_, segment)| segment.subset == subset);
-        for (segment, _) in of_subset {
-            let residual = &self.residuals[segment];
-            let mut x = DMatrix::from_fn(residual.len(), columns.len(), |row, column| {
-                self.columns[columns[column]][segment][row]
-            });
-            let left =
-                DVector::from_column_slice(residual) - &x * DVector::from_column_slice(&fit.coefficients);
-            let leverage = (&x * &fit.covariance).component_mul(&x).column_sum();
-            for (mut row, (left, leverage)) in x.row_iter_mut().zip(left.iter().zip(leverage.iter())) {
-                row *= left / (1.0 - leverage.min(1.0 - f64::EPSILON));
-            }
-            middle += x.tr_mul(&x);
-        }
-        &fit.covariance * middle * &fit.covariance
     }
 
     pub(crate) fn whitened(&self, subset: Subset, residuals: &[Vec<Vec<f64>>]) -> Vec<(usize, Vec<f64>)> {

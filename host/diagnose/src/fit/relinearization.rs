@@ -13,7 +13,7 @@ use crate::criteria::{
     FIRST_PREDICTION_LAG, HOPELESS_LAG, HOPELESS_PREDICTED_SHARE, RELINEARIZATION_SETTLED,
 };
 use crate::fit::candidate_model::ExtendedPrediction;
-use crate::fit::candidate_model::{CandidateModel, Choice, Simulated};
+use crate::fit::candidate_model::{AfterRecords, CandidateModel, Choice, Simulated};
 use crate::fit::closed_fit::ClosedFit;
 use crate::fit::covariance::covariance;
 use crate::fit::library::Library;
@@ -172,6 +172,8 @@ impl ClosedFit for Relinearization<'_> {
         found.simulated = Some(Simulated {
             covariance: covariance(self.study, library, regression, &found, 1.0),
             starts: Vec::new(),
+            baseline: None,
+            steps: Vec::new(),
             reading: Some(reading),
         });
         Some(found)
@@ -190,10 +192,11 @@ impl ClosedFit for Relinearization<'_> {
         self.by_own_slopes(library, regression, explanation)
     }
 
-    fn left_by_baseline(&self, _: &Library, regression: &Regression) -> Option<f64> {
+    fn left_by_baseline(&self, _: &Library, regression: &Regression) -> Option<(f64, Option<AfterRecords>)> {
         let known: Vec<Clean> = self.study.records.iter().map(Record::predicted).collect();
         let reading = self.read(&[], Some(&known))?;
-        Some(regression.refit(Subset::Whole, &[], &reading.residuals)?.before)
+        let left = regression.refit(Subset::Whole, &[], &reading.residuals)?.before;
+        Some((left, None))
     }
 
     fn left_of(&self, _: &Library, explanation: &CandidateModel) -> Option<Residuals> {

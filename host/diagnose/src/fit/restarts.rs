@@ -61,7 +61,7 @@ impl OutputError<'_> {
                 let least = best.as_ref().map_or(ended.left, |best| best.0);
                 if let Some(left) = self
                     .residuals(problem, segments, &moved)
-                    .map(|left| energy(&left))
+                    .map(|left| energy(&left, &moved))
                     && left < least - SEARCH_SETTLED
                 {
                     best = Some((left, moved));

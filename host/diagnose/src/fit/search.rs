@@ -6,6 +6,7 @@ use quietcut_numerics::least_squares::{Damping, Idle, LevenbergMarquardt, Normal
 
 use crate::criteria::{HOPELESS_LAG, HOPELESS_PREDICTED_SHARE, SEARCH_SETTLED, SLOW_CATCHING_UP};
 use crate::fit::output_error::OutputError;
+use crate::fit::projection::Projection;
 use crate::fit::segment::Segment;
 use crate::fit::unknowns::{
     FitProblem, ParameterPoint, RIDGE, SearchResult, at_bounds, energy, predicted, stepped,
@@ -40,6 +41,9 @@ struct Search<'a, 'b, 'c> {
     problem: &'b mut FitProblem<'c>,
     segments: &'b [&'b Segment],
     rival: f64,
+    /// Normal matrix of the last linearization.
+    normal: DMatrix<f64>,
+    projection: Option<Projection>,
 }
 
 impl Search<'_, '_, '_> {
@@ -56,7 +60,7 @@ impl Objective for Search<'_, '_, '_> {
 
     fn value(&mut self, point: &ParameterPoint) -> Option<Residuals> {
         let of_segments = self.fit.residuals(self.problem, self.segments, point)?;
-        let left = energy(&of_segments);
+        let left = energy(&of_segments, point);
         Some(Residuals { of_segments, left })
     }
 
@@ -65,11 +69,19 @@ impl Objective for Search<'_, '_, '_> {
         let columns = self.fit.columns(self.problem, self.segments, point, residuals)?;
         let (mut matrix, mut gradient) = self.fit.normal(self.problem, &columns, point, residuals);
         at_bounds(self.problem, point, &mut matrix, &mut gradient);
+        self.normal.clone_from(&matrix);
+        self.projection = Projection::new(self.problem, &matrix);
+        if let Some(projection) = &self.projection {
+            projection.separate(&mut matrix, &mut gradient);
+        }
         Some(NormalSums { matrix, gradient })
     }
 
     fn moved(&self, point: &ParameterPoint, step: &DVector<f64>) -> ParameterPoint {
-        stepped(self.problem, point, step)
+        match &self.projection {
+            Some(projection) => stepped(self.problem, point, &projection.whole(step)),
+            None => stepped(self.problem, point, step),
+        }
     }
 
     fn is_no_worse(&self, next: &Residuals, now: &Residuals) -> bool {
@@ -111,7 +123,7 @@ impl OutputError<'_> {
         rival: f64,
     ) -> Option<SearchResult> {
         if problem.slots.is_empty() {
-            let left = energy(&self.residuals(problem, segments, &start)?);
+            let left = energy(&self.residuals(problem, segments, &start)?, &start);
             return Some(SearchResult {
                 point: start,
                 left,
@@ -123,6 +135,8 @@ impl OutputError<'_> {
             problem,
             segments,
             rival,
+            normal: DMatrix::zeros(0, 0),
+            projection: None,
         };
         let iteration = LevenbergMarquardt {
             damping: DAMPING,
@@ -132,7 +146,7 @@ impl OutputError<'_> {
             idle: Idle::Hold,
         };
         let found = iteration.minimize(&mut search, start)?;
-        let normal = found.sums.map_or(DMatrix::zeros(0, 0), |sums| sums.matrix);
+        let normal = found.sums.map_or(DMatrix::zeros(0, 0), |_| search.normal);
         (found.stop != Stop::LeftDomain).then_some(SearchResult {
             point: found.point,
             left: found.value.left,

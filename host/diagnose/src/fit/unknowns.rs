@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use quietcut_numerics::least_squares::{Idle, NormalEquations};
 
+use crate::candidates::closed_loop::Extended;
 use crate::fit::candidate_model::Choice;
 use crate::fit::library::Library;
 use crate::records::study::Study;
@@ -12,6 +13,8 @@ use quietcut_simulate::Effects;
 /// Values of all parameters and initial states of a candidate model.
 #[derive(Clone, Debug)]
 pub(crate) struct ParameterPoint {
+    /// The uncertain parameters of the baseline, in their standard deviations from the case.
+    pub(crate) baseline: DVector<f64>,
     /// For each cause of the candidate model: its coefficients, followed by its nonlinear parameters.
     pub(crate) inner: Vec<Vec<f64>>,
     /// For each record: the initial state of the simulation; empty for a start from rest.
@@ -21,6 +24,8 @@ pub(crate) struct ParameterPoint {
 /// One parameter of a cause, or one component of an initial state, that is fitted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum FreeParameter {
+    /// Number of an uncertain parameter of the baseline.
+    Baseline(usize),
     Inner {
         choice: usize,
         index: usize,
@@ -40,6 +45,8 @@ pub(crate) struct FitProblem<'a> {
     /// Smallest step of a finite difference with respect to a parameter of a cause, relative to that parameter. Initial
     /// states have a limit of their own.
     pub(crate) least_step: f64,
+    /// Smallest step of a finite difference with respect to an uncertain parameter of the baseline, in its standard deviations.
+    pub(crate) least_baseline_step: f64,
 }
 
 /// Result of a search for a candidate model's parameters: their values, χ² there and the normal matrix.
@@ -54,6 +61,7 @@ pub(crate) struct SearchResult {
 impl FreeParameter {
     pub(crate) fn of(self, point: &mut ParameterPoint) -> &mut f64 {
         match self {
+            Self::Baseline(index) => &mut point.baseline[index],
             Self::Inner { choice, index, .. } => &mut point.inner[choice][index],
             Self::Start { record, index } => &mut point.starts[record][index],
         }
@@ -63,7 +71,7 @@ impl FreeParameter {
     /// changes only its own record.
     pub(crate) fn affects(self, record: usize) -> bool {
         match self {
-            Self::Inner { .. } => true,
+            Self::Baseline(_) | Self::Inner { .. } => true,
             Self::Start { record: own, .. } => own == record,
         }
     }
@@ -76,9 +84,21 @@ impl FitProblem<'_> {
         slots.filter(|slot| matches!(slot, FreeParameter::Inner { .. }))
     }
 
-    /// The effects of the candidate model with the parameters of `point`; `None` if they are not physical, or not
-    /// possible as effects.
-    pub(crate) fn effects(&self, study: &Study<'_>, point: &ParameterPoint) -> Option<Effects> {
+    /// The extended case with the parameters of `point`; `None` if they are not physical, or not possible as effects.
+    pub(crate) fn extended(&self, study: &Study<'_>, point: &ParameterPoint) -> Option<Extended> {
+        let uncertain = &study.uncertain;
+        let structure = if point.baseline == uncertain.at {
+            None
+        } else {
+            Some(uncertain.structure(study.baseline.case, &point.baseline)?)
+        };
+        Some(Extended {
+            effects: self.effects(study, point)?,
+            structure,
+        })
+    }
+
+    fn effects(&self, study: &Study<'_>, point: &ParameterPoint) -> Option<Effects> {
         let Self { library, choices, .. } = self;
         let mut tables = Vec::new();
         for (choice, inner) in choices.iter().zip(&point.inner) {
@@ -95,9 +115,10 @@ impl FitProblem<'_> {
     }
 }
 
-/// χ² of all records from their whitened residuals.
-pub(crate) fn energy(residuals: &[Vec<f64>]) -> f64 {
-    residuals.iter().map(|residual| dot(residual, residual)).sum()
+/// χ² of all records from their whitened residuals, and of the uncertain parameters of the baseline.
+pub(crate) fn energy(residuals: &[Vec<f64>], point: &ParameterPoint) -> f64 {
+    let of_records: f64 = residuals.iter().map(|residual| dot(residual, residual)).sum();
+    of_records + point.baseline.norm_squared()
 }
 
 /// The parameter values after the step `step` of the free parameters from `point`, limited to the bounds of the
@@ -157,6 +178,24 @@ pub(crate) fn at_bounds(
 /// matrix cannot be inverted.
 pub(crate) fn covariance(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(NormalEquations::new(normal, RIDGE, Idle::Hold)?.inverse())
+}
+
+/// The uncertain parameters of the baseline, in their standard deviations from the case, and their covariance; `None` without
+/// such parameters, or if the normal matrix cannot be inverted.
+pub(crate) fn of_baseline(
+    slots: &[FreeParameter],
+    found: &SearchResult,
+) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    let places: Vec<usize> = (0..slots.len())
+        .filter(|place| matches!(slots[*place], FreeParameter::Baseline(_)))
+        .collect();
+    if places.is_empty() {
+        return None;
+    }
+    let own = covariance(&found.normal)?
+        .select_rows(&places)
+        .select_columns(&places);
+    Some((found.point.baseline.clone(), own))
 }
 
 /// For each cause of the candidate model: covariance of its parameters for unit-variance noise, with the initial states

@@ -21,6 +21,7 @@ mod channel_reduction;
 pub(crate) mod circle;
 pub(crate) mod common;
 pub(crate) mod distance;
+pub(crate) mod followed;
 pub(crate) mod reduction;
 mod smoothing_spline;
 pub(crate) mod speed_from_orders;

@@ -28,7 +28,7 @@ pub(crate) struct SpindleAngle {
     pub angle_deviation_rad: f64,
     /// Standard deviation of the mean error of θ over the record (one phase per record), rad: that of the mean of all
     /// edges, and the rounding of an edge to a sample where the edges do not scatter by as much, so that their mean
-    /// does not average it. Infinite without a tachometer.
+    /// does not average it. Without a tachometer that of an angle which may be any.
     pub phase_deviation_rad: f64,
 }
 
@@ -99,8 +99,35 @@ impl SpindleAngle {
             frequency_deviation_hz,
             speed_wander: 0.0,
             angle_deviation_rad: 0.0,
-            phase_deviation_rad: f64::INFINITY,
+            phase_deviation_rad: ANY_PHASE_RAD,
         }
+    }
+
+    /// This angle with its zero later by a share of a revolution, from 0 to 1; any zero was as probable before.
+    pub(crate) fn turned(&self, share: f64, rate_hz: f64) -> Self {
+        let edges_s = self.times_at((0..self.count()).map(|edge| edge as f64 + share));
+        Self {
+            phase_deviation_rad: ANY_PHASE_RAD,
+            ..Self::from_edges(edges_s, rate_hz)
+        }
+    }
+
+    /// Times, s after the first sample, at which the angle has these values within the whole revolutions, in revolutions.
+    pub(crate) fn times_at(&self, revolutions: impl Iterator<Item = f64>) -> Vec<f64> {
+        let last = self.count();
+        revolutions
+            .map(|wanted| {
+                let edge = (wanted.max(0.0) as usize).min(last - 1);
+                let between = self.edges_s[edge + 1] - self.edges_s[edge];
+                let mut time_s = self.edges_s[edge] + (wanted - edge as f64) * between;
+                // The speed hardly changes within a revolution: each step is exact but for that.
+                for _ in 0..3 {
+                    let there = self.revolutions_at(std::iter::once(time_s))[0];
+                    time_s = (time_s + (wanted - there) * between).clamp(self.edges_s[0], self.edges_s[last]);
+                }
+                time_s
+            })
+            .collect()
     }
 
     /// Number of whole revolutions.
@@ -121,6 +148,9 @@ impl SpindleAngle {
         self.revolutions.at(times_s.map(|t| (t - first) * mean_hz))
     }
 }
+
+/// Standard deviation of an angle that may be any, rad.
+const ANY_PHASE_RAD: f64 = TAU / 3.464_101_615_137_754_6;
 
 /// Times the sample rate that times of edges are exact, where samples lie on the edges.
 const FINER: f64 = 20.0;

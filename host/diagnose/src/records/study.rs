@@ -1,6 +1,7 @@
 //! The baseline and the recordings of one diagnosis.
 
 use crate::baseline::Baseline;
+use crate::baseline::uncertain::Uncertain;
 use crate::error::DiagnoseError;
 use crate::records::domain::Domain;
 use crate::records::prepare::prepare;
@@ -13,6 +14,8 @@ use quietcut_recording::Recording;
 pub(crate) struct Study<'a> {
     /// The baseline model: the case file with its extensions.
     pub baseline: Baseline<'a>,
+    /// Parameters of its structure that are fitted with every candidate model; none for a study of the case as it is.
+    pub uncertain: Uncertain,
     /// Recordings of tests or cuts, each with the prediction of the baseline.
     pub records: Vec<Record>,
 }
@@ -49,7 +52,27 @@ impl<'a> Study<'a> {
             .enumerate()
             .map(|(index, recording)| prepare(&baseline, recording, known(index)))
             .collect::<Result<Vec<_>, _>>()?;
-        Ok(Self { baseline, records })
+        Ok(Self {
+            baseline,
+            uncertain: Uncertain::default(),
+            records,
+        })
+    }
+
+    /// [`Self::new`] with parameters of the structure that are fitted with every candidate model; the case is at
+    /// [`Uncertain::at`].
+    ///
+    /// # Errors
+    /// No recording is given, the case cannot be simulated, or a recording cannot be compared.
+    pub(crate) fn uncertain(
+        case: &'a Case,
+        recordings: &[Recording],
+        uncertain: Uncertain,
+    ) -> Result<Self, DiagnoseError> {
+        Ok(Self {
+            uncertain,
+            ..Self::new(case, recordings)?
+        })
     }
 
     /// Axes of the machine along which the structure moves and some record has a force, or a motion above the noise.

@@ -33,7 +33,7 @@ pub(crate) fn extended_rebaselined(
     let mut case: Case = study.baseline.case.clone();
     case.extensions
         .extend(joined(extensions.iter().map(|(name, table)| (*name, table))));
-    let Ok(rebaselined) = Study::new(&case, recordings) else {
+    let Ok(rebaselined) = Study::uncertain(&case, recordings, study.uncertain.clone()) else {
         return Vec::new();
     };
     if rebaselined.baseline.first_order.a == study.baseline.first_order.a {

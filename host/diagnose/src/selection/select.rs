@@ -6,7 +6,7 @@ use crate::criteria::{
     NOISE_TOLERANCE, NOTHING_TO_EXPLAIN, OVER_COMPUTATION_ERROR, RELATIVE_ERROR_OF_CUTS, SAMPLING_RESIDUAL,
     SAMPLING_RESIDUAL_SIMULATED,
 };
-use crate::fit::candidate_model::CandidateModel;
+use crate::fit::candidate_model::{AfterRecords, CandidateModel};
 use crate::fit::closed_fit::ClosedFit;
 use crate::fit::library::Library;
 use crate::fit::output_error::OutputError;
@@ -49,6 +49,8 @@ pub(crate) struct SelectionCriteria<'a> {
     /// χ² of the baseline, with which the χ² of simulated candidate models is compared: from a simulation of the
     /// baseline if one is possible, otherwise along the measured motion.
     pub(crate) reference: f64,
+    /// Uncertain parameters of the baseline after the records, without a cause; `None` if it has none or is not simulated.
+    pub(crate) baseline: Option<AfterRecords>,
     /// χ² by errors of the computation of a cut, which are proportional to the signal: `RELATIVE_ERROR_OF_CUTS`
     /// squared, times the signal energy in units of the noise variance. A wrong cause can gain this much. Zero for
     /// tests of the structure.
@@ -71,6 +73,7 @@ impl<'a> SelectionCriteria<'a> {
         let by_baseline = closed
             .as_ref()
             .and_then(|closed| closed.left_by_baseline(library, regression));
+        let (by_baseline, after) = by_baseline.unzip();
         let is_cut = study.records.iter().any(|record| record.cut.is_some());
         Self {
             study,
@@ -82,6 +85,7 @@ impl<'a> SelectionCriteria<'a> {
                 0.0
             },
             inflation: inflation(regression),
+            baseline: after.flatten(),
             reference: by_baseline.unwrap_or_else(|| regression.residual(Subset::Whole)),
         }
     }
@@ -121,6 +125,8 @@ impl<'a> SelectionCriteria<'a> {
         // A simulated candidate model is compared with the simulated baseline.
         let reference = match model.simulated {
             Some(_) => self.reference,
+            // What is not simulated must leave less than the baseline does with its uncertain parameters simulated.
+            None if self.study.uncertain.len() > 0 => regression.residual(Subset::Whole).min(self.reference),
             None => regression.residual(Subset::Whole),
         };
         (reference - model.fit.left) / inflation - model.parameter_count as f64 * count.ln()

@@ -8,5 +8,6 @@ mod quintic_stiffness;
 mod sensor;
 pub(crate) mod structure;
 mod two_effects;
+mod uncertain_structure;
 mod velocity_jump;
 pub(crate) mod virtual_records;

@@ -87,6 +87,26 @@ impl CubicForce {
             3.0 * self.damping[entry] * v[j] * v[j],
         ]
     }
+
+    /// ∂²f₃ᵢ/∂qⱼ² and ∂²f₃ᵢ/∂vⱼ², which are 6·K₃ᵢⱼ·qⱼ and 6·C₃ᵢⱼ·vⱼ; all mixed second derivatives are zero.
+    pub fn curvatures(&self, (i, j): (usize, usize), q: &[f64], v: &[f64]) -> [f64; 2] {
+        let entry = i * self.size + j;
+        [
+            6.0 * self.stiffness[entry] * q[j],
+            6.0 * self.damping[entry] * v[j],
+        ]
+    }
+
+    /// The same force with the matrix C₃ times `damping` and K₃ times `stiffness`.
+    #[must_use]
+    pub fn scaled(&self, damping: f64, stiffness: f64) -> Self {
+        let times = |matrix: &[f64], factor: f64| matrix.iter().map(|entry| entry * factor).collect();
+        Self {
+            size: self.size,
+            damping: times(&self.damping, damping),
+            stiffness: times(&self.stiffness, stiffness),
+        }
+    }
 }
 
 fn dot_cubes(a: &[f64], b: &[f64]) -> f64 {
@@ -98,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn slopes_are_those_of_the_force() {
+    fn slopes_and_curvatures_are_those_of_the_force() {
         let matrix = |entries: [f64; 4]| Some(DMatrix::from_row_slice(2, 2, &entries));
         let matrices = Matrices {
             mass: DMatrix::from_row_slice(2, 2, &[2.0, 0.3, 0.3, 1.0]),
@@ -121,6 +141,11 @@ mod tests {
                 let by_q = (of(moved(q, step), v) - of(moved(q, -step), v)) / (2.0 * step);
                 let by_v = (of(q, moved(v, step)) - of(q, moved(v, -step))) / (2.0 * step);
                 assert!((found[0] - by_q).abs() < 1e-8 && (found[1] - by_v).abs() < 1e-8);
+                let bent = cubic.curvatures((i, j), &q, &v);
+                let slope = |q: [f64; 2], v: [f64; 2]| cubic.slopes((i, j), &q, &v);
+                let by_q = (slope(moved(q, step), v)[0] - slope(moved(q, -step), v)[0]) / (2.0 * step);
+                let by_v = (slope(q, moved(v, step))[1] - slope(q, moved(v, -step))[1]) / (2.0 * step);
+                assert!((bent[0] - by_q).abs() < 1e-7 && (bent[1] - by_v).abs() < 1e-7);
             }
         }
         // M⁻¹(C₃ v³·9 + K₃ q³/3), by hand.

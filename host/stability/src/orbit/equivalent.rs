@@ -87,7 +87,7 @@ struct Sample {
 
 impl Sample {
     fn depth_m(&self) -> f64 {
-        self.settled.orbit.depth_m
+        self.settled.orbit.value
     }
 
     fn outside(&self) -> i32 {
@@ -213,7 +213,7 @@ impl<'a> Follower<'a> {
     fn settle(&self, depth_m: f64, guess: &Settled) -> Result<Settled, StabilityError> {
         let all = self.problem;
         let mut now = guess.clone();
-        now.orbit.depth_m = depth_m;
+        now.orbit.value = depth_m;
         let mut mixing = Anderson::new(REMEMBERED);
         let mut units = None;
         for _ in 0..ROUNDS {
@@ -239,16 +239,16 @@ impl<'a> Follower<'a> {
         let map = self.map.of(&problem);
         let none = |_| {
             self.broke_down(
-                guess.depth_m,
+                guess.value,
                 "no forced orbit is found with the equivalent springs",
             )
         };
         if problem.is_linear() {
-            return Orbit::of_linear(&map, guess.depth_m).map_err(none);
+            return Orbit::of_linear(&map, guess.value).map_err(none);
         }
         let scale = Scale {
-            state: size_at(&map, guess.depth_m),
-            depth_m: guess.depth_m,
+            state: size_at(&map, guess.value),
+            value: guess.value,
         };
         let mut along_depth = DVector::zeros(map.size() + 1);
         along_depth[map.size()] = 1.0;
@@ -269,7 +269,7 @@ impl<'a> Follower<'a> {
         let problem = self.problem.with(springs);
         let singular = "the equations of the forced orbit are singular";
         let all = self.map.of(&problem).multipliers(orbit);
-        let all = all.map_err(|cause| cause.at(self.rpm, 1e3 * orbit.depth_m, singular))?;
+        let all = all.map_err(|cause| cause.at(self.rpm, 1e3 * orbit.value, singular))?;
         Ok(all
             .into_iter()
             .take_while(|multiplier| multiplier.norm() > EQUIVALENT_FOLLOWED)

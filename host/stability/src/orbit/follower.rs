@@ -1,4 +1,4 @@
-//! Follows a branch of forced orbits over the axial depth.
+//! Follows a branch of forced orbits over one parameter.
 //!
 //! Pseudo-arclength continuation passes folds. At every orbit all Floquet multipliers (characteristic multipliers) of
 //! the linearized delay equation are computed. Steps are so short that each multiplier near the unit circle can be
@@ -8,12 +8,10 @@ use nalgebra::DVector;
 use num_complex::Complex64;
 use quietcut_numerics::roots::SignChange;
 
-use super::branch::{Branch, BranchPoint, Event, Extent};
-use super::forced::ForcedProblem;
+use super::branch::{Branch, BranchPoint, BrokenBranch, Event, Extent};
 use super::pairing::{FOLLOWED, nearest, pair, share_of_distance};
+use super::parameter::Place;
 use super::periodic_orbit::{Orbit, OrbitError, PeriodMap, Predecessor, Scale, Tangent};
-use super::revolution_period::RevolutionPeriod;
-use super::tooth_period::ToothPeriod;
 use crate::criteria::{
     BRANCH_STEP_CLEAR, BRANCH_STEP_MAX, BRANCH_STEP_MIN, CIRCLE_SHARE_MAX, LEAST_ERROR, ORBIT_ROOM,
 };
@@ -23,95 +21,23 @@ use crate::spectrum::stability_loss::StabilityLoss;
 /// with the longest step. A choice.
 const STEPS_MAX: usize = 1000;
 
-/// Follows the forced orbits at one spindle speed from depth 0 until the depth reaches `depth_mm` or returns to 0; with
-/// [`Extent::FirstLoss`] at most until a multiplier leaves the unit circle.
+/// Forced orbit of a map over the depth at a depth, reached by continuation from depth 0.
 ///
 /// # Errors
-/// The branch cannot be followed further with the shortest step, or takes too many steps; or no preceding tooth cuts
-/// the surface in front of some tooth.
-pub fn follow_depth(
-    problem: &ForcedProblem,
-    rpm: f64,
-    depth_mm: f64,
-    extent: Extent,
-) -> Result<Branch, OrbitError> {
-    let depth_m = depth_mm * 1e-3;
-    match &problem.uneven {
-        None => Follower::new(ToothPeriod::new(problem, rpm), rpm, depth_m).follow(extent),
-        Some(uneven) => {
-            let map = RevolutionPeriod::new(problem, uneven, rpm, depth_m)
-                .ok_or(OrbitError::Singular { depth_mm })?;
-            Follower::new(map, rpm, depth_m).follow(extent)
-        }
-    }
+/// The orbit cannot be followed to this depth.
+pub(super) fn orbit_at_depth<M: PeriodMap>(map: M, rpm: f64, depth_m: f64) -> Result<Orbit, OrbitError> {
+    Ok(Follower::new(map, rpm, depth_m).up_to(depth_m)?.orbit)
 }
 
-/// Dominant Floquet multiplier of a forced orbit.
-pub(super) struct Dominant {
-    /// Dominant multiplier of the orbit; of a conjugate pair the one above the real axis.
-    pub(super) multiplier: Complex64,
-    /// Vibration frequency of the Floquet mode that belongs to the multiplier, Hz; `None` if it cannot be computed.
-    pub(super) chatter_hz: Option<f64>,
-}
-
-/// Dominant Floquet multiplier about the forced orbit at a depth, from the working mesh and from a finer one.
-pub(super) fn multiplier_at(
-    problem: &ForcedProblem,
-    rpm: f64,
-    depth_mm: f64,
-) -> Result<[Dominant; 2], OrbitError> {
-    match &problem.uneven {
-        None => dominant_of(ToothPeriod::new(problem, rpm), rpm, depth_mm),
-        Some(uneven) => {
-            let map = RevolutionPeriod::new(problem, uneven, rpm, depth_mm * 1e-3)
-                .ok_or(OrbitError::Singular { depth_mm })?;
-            dominant_of(map, rpm, depth_mm)
-        }
-    }
-}
-
-/// Forced orbit at a depth, reached by continuation from depth 0.
-#[cfg(test)]
-pub(super) fn orbit_at(problem: &ForcedProblem, rpm: f64, depth_mm: f64) -> Result<Orbit, OrbitError> {
-    let depth_m = depth_mm * 1e-3;
-    Ok(match &problem.uneven {
-        None => Follower::new(ToothPeriod::new(problem, rpm), rpm, depth_m).up_to(depth_m)?,
-        Some(uneven) => {
-            let map = RevolutionPeriod::new(problem, uneven, rpm, depth_m)
-                .ok_or(OrbitError::Singular { depth_mm })?;
-            Follower::new(map, rpm, depth_m).up_to(depth_m)?
-        }
-    }
-    .orbit)
-}
-
-fn dominant_of<M: PeriodMap>(map: M, rpm: f64, depth_mm: f64) -> Result<[Dominant; 2], OrbitError> {
-    let singular = OrbitError::Singular { depth_mm };
-    let finer = map.finer().ok_or(singular)?;
-    let at = |map: M| {
-        let follower = Follower::new(map, rpm, depth_mm * 1e-3);
-        let orbit = follower.up_to(depth_mm * 1e-3)?.orbit;
-        let all = follower.map.multipliers(&orbit);
-        let all = all.map_err(|cause| OrbitError::of_multipliers(cause, depth_mm))?;
-        let multiplier = *all.first().ok_or(singular)?;
-        let multiplier = Complex64::new(multiplier.re, multiplier.im.abs());
-        Ok(Dominant {
-            multiplier,
-            chatter_hz: follower.map.chatter_hz(&orbit, multiplier),
-        })
-    };
-    Ok([at(map)?, at(finer)?])
-}
-
-/// Norm of the orbit's state at the start of the period at a depth, from the equation linearized about rest at depth 0,
-/// or 1 if that gives none above 0: the unit of the state along a branch.
-pub(super) fn size_at(map: &impl PeriodMap, depth_m: f64) -> f64 {
+/// Norm of the orbit's state at the start of the period at a value of the varied parameter, a depth or feed, from the
+/// equation linearized about rest at the value 0, or 1 if that gives none above 0: the unit of the state along a branch.
+pub(super) fn size_at(map: &impl PeriodMap, value: f64) -> f64 {
     let rest = Orbit::rest(map);
     let linear = map
         .integrate(&rest.start, 0.0, &rest.states)
         .and_then(|integration| {
-            let by_depth = integration.by.column(map.size()) * depth_m;
-            integration.periodic().lu().solve(&by_depth)
+            let at_value = integration.by.column(map.size()) * value;
+            integration.periodic().lu().solve(&at_value)
         });
     // Without feed and edge forces the orbit is rest, and any unit of its size serves; so it does if the linearized
     // equation is singular.
@@ -122,15 +48,17 @@ pub(super) fn size_at(map: &impl PeriodMap, depth_m: f64) -> f64 {
 }
 
 pub(super) struct Follower<M> {
-    map: M,
+    pub(super) map: M,
     rpm: f64,
     scale: Scale,
+    /// First and last value of the parameter, in the unit of computations.
+    range: [f64; 2],
 }
 
 /// Orbit with its Floquet multipliers.
 #[derive(Clone)]
-struct Sample {
-    orbit: Orbit,
+pub(super) struct Sample {
+    pub(super) orbit: Orbit,
     tangent: Tangent,
     /// Orbit from which this one was reached; `None` for the first one of a branch.
     before: Option<Predecessor>,
@@ -153,31 +81,44 @@ impl<M: PeriodMap> Follower<M> {
     pub(super) fn new(map: M, rpm: f64, depth_m: f64) -> Self {
         // The requested depth is the unit of steps in depth along the branch; at depth 0 any positive unit serves.
         let depth_m = if depth_m > 0.0 { depth_m } else { 1e-3 };
+        let state = size_at(&map, depth_m);
+        Self::over([0.0, depth_m], map, rpm, state)
+    }
+
+    /// Follower from the first value of a range to the last one, with a unit of the state along the branch.
+    pub(super) fn over(range: [f64; 2], map: M, rpm: f64, state: f64) -> Self {
+        let length = (range[1] - range[0]).abs();
         let scale = Scale {
-            state: size_at(&map, depth_m),
-            depth_m,
+            // Any unit serves for an orbit that starts at rest, and for a range without length.
+            state: if state > 0.0 { state } else { 1.0 },
+            value: if length > 0.0 { length } else { 1.0 },
         };
-        Self { map, rpm, scale }
+        Self {
+            map,
+            rpm,
+            scale,
+            range,
+        }
     }
 
     /// Forced orbit with its multipliers at a depth, reached by continuation from depth 0.
-    fn up_to(&self, depth_m: f64) -> Result<Sample, OrbitError> {
+    pub(super) fn up_to(&self, depth_m: f64) -> Result<Sample, OrbitError> {
         let order = self.map.size();
         let mut along_depth = DVector::zeros(order + 1);
         along_depth[order] = 1.0;
         let mut here = self.sample(&Orbit::rest(&self.map), &along_depth)?;
         let mut step = BRANCH_STEP_MAX;
-        while here.orbit.depth_m < depth_m {
-            let depth_mm = here.orbit.depth_m * 1e3;
-            let towards = here.tangent.along[order] * self.scale.depth_m;
+        while here.orbit.value < depth_m {
+            let towards = here.tangent.along[order] * self.scale.value;
             if towards <= 0.0 {
-                return Err(OrbitError::Lost { depth_mm });
+                let place = self.place(&here.orbit);
+                return Err(OrbitError::Lost { place });
             }
-            let next = if here.orbit.depth_m + towards * step >= depth_m {
+            let next = if here.orbit.value + towards * step >= depth_m {
                 // The last step ends exactly at the requested depth.
-                let rest = (depth_m - here.orbit.depth_m) / towards;
+                let rest = (depth_m - here.orbit.value) / towards;
                 let mut guess = here.orbit.along(&here.tangent, rest, self.scale);
-                guess.depth_m = depth_m;
+                guess.value = depth_m;
                 self.sample(&guess, &along_depth)
             } else {
                 self.step(&here, step)
@@ -187,29 +128,55 @@ impl<M: PeriodMap> Follower<M> {
                 Err(_) if step > BRANCH_STEP_MIN => step *= 0.5,
                 Err(error) => return Err(error),
             }
-            if (here.orbit.depth_m - depth_m).abs() <= 1e-12 * depth_m {
+            if (here.orbit.value - depth_m).abs() <= 1e-12 * depth_m {
                 break;
             }
         }
         Ok(here)
     }
 
+    pub(super) fn place(&self, orbit: &Orbit) -> Place {
+        self.map.parameter().at(orbit.value)
+    }
+
+    /// Follows the branch that starts from rest at depth 0.
     pub(super) fn follow(&self, extent: Extent) -> Result<Branch, OrbitError> {
+        self.whole(&Orbit::rest(&self.map), extent)
+            .map_err(|broken| broken.cause)
+    }
+
+    /// Follows the branch through an orbit at the first value of the range.
+    pub(super) fn whole(&self, start: &Orbit, extent: Extent) -> Result<Branch, BrokenBranch> {
         let order = self.map.size();
-        let mut along_depth = DVector::zeros(order + 1);
-        along_depth[order] = 1.0;
-        let mut here = self.sample(&Orbit::rest(&self.map), &along_depth)?;
+        let mut towards = DVector::zeros(order + 1);
+        towards[order] = (self.range[1] - self.range[0]).signum();
+        let here = self
+            .sample(start, &towards)
+            .map_err(|cause| BrokenBranch { cause, branch: None })?;
         let mut branch = Branch {
+            parameter: self.map.parameter(),
             rpm: self.rpm,
             points: vec![self.point(&here)],
             events: Vec::new(),
         };
+        match self.extend(&mut branch, here, extent) {
+            Ok(()) => Ok(branch),
+            Err(cause) => Err(BrokenBranch {
+                cause,
+                branch: Some(Box::new(branch)),
+            }),
+        }
+    }
+
+    /// Appends to a branch what follows its last orbit.
+    fn extend(&self, branch: &mut Branch, mut here: Sample, extent: Extent) -> Result<(), OrbitError> {
+        let [low, high] = [self.range[0].min(self.range[1]), self.range[0].max(self.range[1])];
         let mut step = BRANCH_STEP_MAX;
         for _ in 0..STEPS_MAX {
-            let depth_mm = here.orbit.depth_m * 1e3;
+            let place = self.place(&here.orbit);
             let next = self.step(&here, step).and_then(|next| {
                 let pairs = pair(&here.roots, &next.roots, step <= 2.0 * BRANCH_STEP_MIN);
-                Ok((next, pairs.ok_or(OrbitError::NoConvergence { depth_mm })?))
+                Ok((next, pairs.ok_or(OrbitError::NoConvergence { place })?))
             });
             let (next, pairs) = match next {
                 Ok(found) => found,
@@ -234,8 +201,8 @@ impl<M: PeriodMap> Follower<M> {
             here = next;
             branch.points.push(self.point(&here));
             let lost = extent == Extent::FirstLoss && branch.events.iter().any(|event| !event.gain);
-            if lost || here.orbit.depth_m >= self.scale.depth_m || here.orbit.depth_m <= 0.0 {
-                return Ok(branch);
+            if lost || here.orbit.value >= high || here.orbit.value <= low {
+                return Ok(());
             }
             // The share that a multiplier moves grows with the step; four fifths of the largest leave room for its
             // acceleration.
@@ -243,7 +210,7 @@ impl<M: PeriodMap> Follower<M> {
             step = (1.5 * step).min(clear);
         }
         Err(OrbitError::NoConvergence {
-            depth_mm: here.orbit.depth_m * 1e3,
+            place: self.place(&here.orbit),
         })
     }
 
@@ -266,20 +233,20 @@ impl<M: PeriodMap> Follower<M> {
         }
     }
 
-    /// Axial depth of the forced orbit one step further along the branch, m.
-    fn depth_m(&self, from: &Sample, step: f64) -> Result<f64, OrbitError> {
+    /// Value of the parameter at the forced orbit one step further along the branch.
+    fn value(&self, from: &Sample, step: f64) -> Result<f64, OrbitError> {
         let guess = self.predicted(from, step);
         let (orbit, _) = Orbit::correct(&self.map, &guess, self.scale, &from.tangent.along)?;
-        Ok(orbit.depth_m)
+        Ok(orbit.value)
     }
 
     fn sample(&self, guess: &Orbit, normal: &DVector<f64>) -> Result<Sample, OrbitError> {
         let (orbit, tangent) = Orbit::correct(&self.map, guess, self.scale, normal)?;
-        let depth_mm = orbit.depth_m * 1e3;
+        let place = self.place(&orbit);
         let all = self
             .map
             .multipliers(&orbit)
-            .map_err(|cause| OrbitError::of_multipliers(cause, depth_mm))?;
+            .map_err(|cause| OrbitError::of_multipliers(cause, place))?;
         let largest = all.first().map_or(0.0, |multiplier| multiplier.norm());
         let roots = all
             .into_iter()
@@ -318,13 +285,15 @@ impl<M: PeriodMap> Follower<M> {
             roots[bracket.narrow(middle, excess)] = root;
         }
         let on_circle = root / root.norm();
+        let parameter = self.map.parameter();
         let kind = StabilityLoss::of(root);
         let event = Event {
-            depth_mm: sample.orbit.depth_m * 1e3,
-            error_mm: 1e3 * self.error_m(&sample, root).unwrap_or(self.scale.depth_m),
+            value: self.place(&sample.orbit).value,
+            error: parameter.in_results(self.error(&sample, root).unwrap_or(self.scale.value)),
             kind,
             gain: !outward,
             multiplier: on_circle,
+            orbit: sample.orbit.clone(),
             chatter_hz: match kind {
                 // At a fold the orbit jumps to another one of the same period, so that no new frequency appears.
                 StabilityLoss::Fold => None,
@@ -334,18 +303,19 @@ impl<M: PeriodMap> Follower<M> {
         Some((bracket.ends()[0], event))
     }
 
-    /// Error of the depth of a crossing, m: the change of depth along the branch over which the multiplier moves by its
-    /// error, the larger one of both directions, plus [`ORBIT_ROOM`] times the change of the depth on a finer mesh.
+    /// Error of the parameter at a crossing: its change along the branch over which the multiplier moves by its error,
+    /// the larger one of both directions, plus [`ORBIT_ROOM`] times its change on a finer mesh.
     /// `None` if it cannot be computed, or if the multiplier hardly moves along the branch.
-    fn error_m(&self, at: &Sample, root: Complex64) -> Option<f64> {
+    fn error(&self, at: &Sample, root: Complex64) -> Option<f64> {
         let order = self.map.problem().order();
         let finer = Follower {
             map: self.map.finer()?,
             rpm: self.rpm,
             scale: self.scale,
+            range: self.range,
         };
         // Normal of the hyperplane in which the orbit is corrected on the finer mesh. It contains only the states of
-        // the structure and the depth, which both meshes have in common.
+        // the structure and the parameter, which both meshes have in common.
         let mut normal = DVector::zeros(finer.map.size() + 1);
         normal
             .rows_mut(0, order)
@@ -363,30 +333,18 @@ impl<M: PeriodMap> Follower<M> {
         if reach.is_nan() || reach > BRANCH_STEP_MAX {
             return None;
         }
-        let depth_m = at.orbit.depth_m;
-        let shift_m = |step: f64| Some((self.depth_m(at, step).ok()? - depth_m).abs());
-        let along_m = shift_m(reach)?.max(shift_m(-reach)?);
-        // At a fold the depth is stationary along the branch, so that its change vanishes. At least [`LEAST_ERROR`] of
-        // the depth is therefore stated.
-        Some(along_m.max(LEAST_ERROR * depth_m) + ORBIT_ROOM * (there.orbit.depth_m - depth_m).abs())
+        let value = at.orbit.value;
+        let shift = |step: f64| Some((self.value(at, step).ok()? - value).abs());
+        let along = shift(reach)?.max(shift(-reach)?);
+        // At a fold the parameter is stationary along the branch, so that its change vanishes. At least [`LEAST_ERROR`]
+        // of the parameter is therefore stated.
+        Some(along.max(LEAST_ERROR * value) + ORBIT_ROOM * (there.orbit.value - value).abs())
     }
 
     fn point(&self, sample: &Sample) -> BranchPoint {
-        let c = &self.map.problem().linear.structure.c;
-        let mut low = [f64::INFINITY; 3];
-        let mut high = [f64::NEG_INFINITY; 3];
-        for states in &sample.orbit.states {
-            for state in states.column_iter() {
-                let displacement = c * state;
-                for axis in 0..3 {
-                    low[axis] = low[axis].min(displacement[axis]);
-                    high[axis] = high[axis].max(displacement[axis]);
-                }
-            }
-        }
         BranchPoint {
-            depth_mm: sample.orbit.depth_m * 1e3,
-            amplitude_mm: std::array::from_fn(|axis| 0.5e3 * (high[axis] - low[axis])),
+            value: self.place(&sample.orbit).value,
+            amplitude_mm: self.map.problem().amplitude_mm(&sample.orbit.states),
             multiplier_abs: sample.largest,
             outside: sample.outside(),
         }

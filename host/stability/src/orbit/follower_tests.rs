@@ -1,4 +1,5 @@
 use super::branch::Extent;
+use super::branches::follow_depth;
 use super::follower::*;
 use super::forced::ForcedProblem;
 use super::periodic_orbit::PeriodMap;
@@ -56,7 +57,7 @@ fn the_first_loss_is_a_fold_of_the_orbit_where_it_turns_back() {
     }
     // At this speed the branch turns back twice, so that two stable orbits coexist over a range of depths.
     let branch = follow_depth(&full, rpm(1.0 / 0.165), 15.0, Extent::Whole).unwrap();
-    let bistable = branch.bistable_mm();
+    let bistable = branch.bistable();
     assert_eq!(bistable.len(), 1);
     assert!(bistable[0][0] > 8.55 && bistable[0][1] < 8.63, "{bistable:?}");
 }
@@ -78,12 +79,12 @@ fn stated_errors_of_limits_hold_what_a_mesh_four_times_as_fine_changes() {
         let map = ToothPeriod::new(&full, rpm(tau));
         let finest = first(map.finer().unwrap().finer().unwrap());
         let found = first(map);
-        let change_mm = (found.depth_mm - finest.depth_mm).abs();
+        let change_mm = (found.value - finest.value).abs();
         println!("{tau}: {found:?}, {change_mm:.1e} mm from the finest");
         assert_eq!(found.kind, kind, "{tau}");
-        assert!(change_mm <= found.error_mm, "{tau}: {change_mm} {found:?}");
+        assert!(change_mm <= found.error, "{tau}: {change_mm} {found:?}");
         // Stated errors lie far below the four digits that limits need.
-        assert!(found.error_mm < 1e-5 * found.depth_mm, "{tau}: {found:?}");
+        assert!(found.error < 1e-5 * found.value, "{tau}: {found:?}");
     }
 }
 

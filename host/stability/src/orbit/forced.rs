@@ -42,9 +42,9 @@ pub struct ForcedProblem {
     pub(super) cubic: Option<CubicForce>,
     /// Smooth restoring forces of the case's extensions, with the structure in the machine's axes; `None` without such
     /// forces.
-    smooth: Option<Smooth>,
+    pub(super) smooth: Option<Smooth>,
     /// Chip law of the cutting force; `None` if the cutting force is proportional to the chip thickness.
-    chip: Option<ChipLaw>,
+    pub(super) chip: Option<ChipLaw>,
     /// Process damping; `None` if absent.
     flank: Option<Flank>,
     /// Input matrix B times a constant force along the machine's axes; `None` if no such force acts.
@@ -91,7 +91,7 @@ pub(super) fn has_unequal_teeth(case: &Case) -> Result<bool, StabilityError> {
 
 /// Smooth restoring forces f_r of the case's extensions, along the machine's axes.
 #[derive(Clone, Debug)]
-struct Smooth {
+pub(super) struct Smooth {
     terms: Vec<Arc<dyn RestoringForce>>,
     /// Input matrix B of the structure for forces along the machine's axes.
     b: DMatrix<f64>,

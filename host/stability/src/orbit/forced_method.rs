@@ -1,7 +1,7 @@
 //! Stability method of structures whose limits depend on the forced orbit, for charts and single cuts.
 
 use super::branch::Extent;
-use super::follower::{follow_depth, multiplier_at};
+use super::branches::{follow_depth, multiplier_at};
 use super::forced::ForcedProblem;
 use super::periodic_orbit::OrbitError;
 use crate::criteria::{LEAST_ERROR, ORBIT_ROOM};
@@ -58,6 +58,7 @@ fn broke_down(rpm: f64, depth_mm: f64, cause: OrbitError) -> StabilityError {
         OrbitError::NoConvergence { .. } => "the forced orbit cannot be followed to this depth",
         OrbitError::Singular { .. } => "the equations of the forced orbit are singular",
         OrbitError::Lost { .. } => "the forced orbit is lost in a fold before this depth",
+        OrbitError::NotCovered { what } => what,
         OrbitError::Eigenvalues { cause, .. } => {
             return StabilityError::Eigenvalues { rpm, depth_mm, cause };
         }

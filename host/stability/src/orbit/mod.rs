@@ -9,29 +9,36 @@
 
 mod anderson;
 mod branch;
+mod branches;
 mod choice;
 mod collocated;
 mod collocation_matrix;
+pub mod curve;
 mod equivalent;
+mod explicit;
 mod follower;
 mod forced;
+mod forced_at;
 mod forced_method;
 mod pairing;
+mod parameter;
 mod periodic_orbit;
 mod restoring;
 mod revolution_period;
 mod tooth_period;
 mod tooth_period_map;
 mod variation;
+mod varied_period;
 
 #[cfg(test)]
 mod follower_tests;
 #[cfg(test)]
 mod revolution_period_tests;
 
-pub use branch::{Branch, BranchPoint, Event, Extent};
+pub use branch::{Branch, BranchPoint, BrokenBranch, Event, Extent};
+pub use branches::{follow, follow_depth};
 pub use choice::collocation_of;
 pub use equivalent::EquivalentProblem;
-pub use follower::follow_depth;
 pub use forced::ForcedProblem;
+pub use parameter::{Parameter, Place, Setting};
 pub use periodic_orbit::{Orbit, OrbitError};

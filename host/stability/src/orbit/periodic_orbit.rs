@@ -5,6 +5,7 @@ use num_complex::Complex64;
 
 use super::collocated::Advanced;
 use super::forced::ForcedProblem;
+use super::parameter::{Parameter, Place};
 use crate::error::Breakdown;
 use quietcut_numerics::eigenvalues::EigenvalueError;
 use quietcut_numerics::quadrature::Gauss;
@@ -13,49 +14,55 @@ use quietcut_numerics::quadrature::Gauss;
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum OrbitError {
     /// Newton's method did not converge or failed in a subinterval, or the branch of orbits cannot be followed further.
-    #[error("no periodic orbit was found near the guess at {depth_mm} mm: the iteration does not settle")]
+    #[error("no periodic orbit was found near the guess at {place}: the iteration does not settle")]
     NoConvergence {
-        /// Axial depth, mm.
-        depth_mm: f64,
+        /// Varied parameter and its value.
+        place: Place,
     },
-    /// The branch of orbits turns back in depth (fold) before the requested depth is reached.
-    #[error("the forced orbit is lost in a fold at {depth_mm} mm")]
+    /// The branch of orbits turns back (fold) before the requested value of the varied parameter is reached.
+    #[error("the forced orbit is lost in a fold at {place}")]
     Lost {
-        /// Axial depth of the fold, mm.
-        depth_mm: f64,
+        /// Varied parameter and its value at the fold.
+        place: Place,
     },
     /// The equations of the periodic orbit, or those linearized about it, cannot be solved, for example at a fold or a
     /// branch point; or no preceding tooth cuts the surface in front of some tooth.
-    #[error("the equations of the periodic orbit are singular at {depth_mm} mm")]
+    #[error("the equations of the periodic orbit are singular at {place}")]
     Singular {
-        /// Axial depth, mm.
-        depth_mm: f64,
+        /// Varied parameter and its value.
+        place: Place,
+    },
+    /// The problem has a feature that branches of forced orbits do not cover.
+    #[error("branches of forced orbits do not cover {what}")]
+    NotCovered {
+        /// The feature, and what to do instead.
+        what: &'static str,
     },
     /// The Floquet multipliers about a forced orbit cannot be computed.
-    #[error("the Floquet multipliers about the orbit at {depth_mm} mm cannot be computed: {cause}")]
+    #[error("the Floquet multipliers about the orbit at {place} cannot be computed: {cause}")]
     Eigenvalues {
-        /// Axial depth, mm.
-        depth_mm: f64,
+        /// Varied parameter and its value.
+        place: Place,
         /// Reason from the eigenvalue iteration.
         cause: EigenvalueError,
     },
 }
 
 impl OrbitError {
-    /// Error if the multipliers about an orbit at a depth (mm) cannot be computed.
-    pub(super) fn of_multipliers(cause: Breakdown, depth_mm: f64) -> Self {
+    /// Error if the multipliers about an orbit at a place cannot be computed.
+    pub(super) fn of_multipliers(cause: Breakdown, place: Place) -> Self {
         match cause {
-            Breakdown::Eigenvalues(cause) => Self::Eigenvalues { depth_mm, cause },
-            Breakdown::NoSolution | Breakdown::TooManyMultipliers => Self::Singular { depth_mm },
+            Breakdown::Eigenvalues(cause) => Self::Eigenvalues { place, cause },
+            Breakdown::NoSolution | Breakdown::TooManyMultipliers => Self::Singular { place },
         }
     }
 }
 
 /// Forced periodic orbit, given by its state at the start of the period, where a tooth enters.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Orbit {
-    /// Axial depth, m.
-    pub depth_m: f64,
+    /// Value of the varied parameter in the unit of [`Parameter`]; for the axial depth m.
+    pub value: f64,
     /// State of the orbit at the start of the period: states of the structure, then, for an orbit of the revolution,
     /// the displacements along the chip normals with which the preceding revolution left the surface that this one
     /// cuts.
@@ -64,16 +71,16 @@ pub struct Orbit {
     pub(super) states: Vec<DMatrix<f64>>,
 }
 
-/// Newton step over the period from a start and a depth, with the equations linearized about the states at the nodes.
+/// Newton step over the period from a start and a value of the varied parameter, with the equations linearized about the states at the nodes.
 pub(super) struct PeriodIntegration {
     pub(super) end: DVector<f64>,
-    /// Derivative of the state at the end of the period with respect to the state at its start and the depth; the last
-    /// column is that of the depth, per meter.
+    /// Derivative of the state at the end of the period with respect to the state at its start and the varied
+    /// parameters, which have the last columns.
     pub(super) by: DMatrix<f64>,
     /// States at the nodes of each subinterval after the Newton step over the period.
     pub(super) states: Vec<DMatrix<f64>>,
     /// Derivatives of the states at the nodes of each subinterval with respect to the state at the start of the period
-    /// and the depth, (n m) × number of these variables.
+    /// and the varied parameters, (n m) × number of these variables.
     pub(super) values: Vec<DMatrix<f64>>,
     /// Largest change of a state at a node by the Newton step, relative to the largest state in its subinterval.
     pub(super) moved: f64,
@@ -112,10 +119,10 @@ impl PeriodIntegration {
     }
 }
 
-/// Tangent of a branch of orbits over the depth, at one orbit.
+/// Tangent of a branch of orbits over the varied parameter, at one orbit.
 #[derive(Clone, Debug)]
 pub(super) struct Tangent {
-    /// Unit tangent of the branch: changes of the orbit's start state and of the depth, each divided by its [`Scale`].
+    /// Unit tangent of the branch: changes of the orbit's start state and of the parameter, each divided by its [`Scale`].
     pub(super) along: DVector<f64>,
     /// Change of the states at the nodes of each subinterval per unit of length along the branch, n states × m nodes.
     states: Vec<DMatrix<f64>>,
@@ -150,8 +157,11 @@ const NEAR: f64 = 1e-3;
 /// a cubic. Where the branch turns faster, the tangent predicts it. A choice: the correction does not depend on it.
 const EXTRAPOLATED: f64 = 0.9;
 
-/// Map of a forced problem over a period at one spindle speed on one mesh; forced orbits are its fixed points.
+/// Map of a forced problem over a period on one mesh, with one varied parameter; forced orbits are its fixed points.
 pub(super) trait PeriodMap: Sized {
+    /// Parameter that the map varies.
+    fn parameter(&self) -> Parameter;
+
     /// Forced problem of the map.
     fn problem(&self) -> &ForcedProblem;
 
@@ -166,7 +176,7 @@ pub(super) trait PeriodMap: Sized {
     fn integrate(
         &self,
         start: &DVector<f64>,
-        depth_m: f64,
+        value: f64,
         guess: &[DMatrix<f64>],
     ) -> Option<PeriodIntegration>;
 
@@ -193,7 +203,7 @@ impl Orbit {
         let order = map.problem().order();
         let states = map.subinterval_nodes().into_iter();
         Self {
-            depth_m: 0.0,
+            value: 0.0,
             start: DVector::zeros(map.size()),
             states: states
                 .map(|subinterval| DMatrix::zeros(order, subinterval.gauss.nodes.len()))
@@ -224,7 +234,7 @@ impl Orbit {
         let states: Vec<DMatrix<f64>> = states.collect();
         let state = self.start.rows(0, own.problem().order()).into_owned();
         Self {
-            depth_m: self.depth_m,
+            value: self.value,
             start: other.start_of(state, &states),
             states,
         }
@@ -232,8 +242,9 @@ impl Orbit {
 
     /// Forced orbit of a problem whose equation of motion is linear, by one linear solution.
     pub(super) fn of_linear(map: &impl PeriodMap, depth_m: f64) -> Result<Self, OrbitError> {
-        let depth_mm = depth_m * 1e3;
-        let singular = OrbitError::Singular { depth_mm };
+        let singular = OrbitError::Singular {
+            place: map.parameter().at(depth_m),
+        };
         let rest = Self::rest(map);
         let from_rest = map
             .integrate(&rest.start, depth_m, &rest.states)
@@ -242,7 +253,7 @@ impl Orbit {
         let start = periodic.lu().solve(&from_rest.end).ok_or(singular)?;
         let around = map.integrate(&start, depth_m, &rest.states).ok_or(singular)?;
         Ok(Self {
-            depth_m,
+            value: depth_m,
             start,
             states: around.states,
         })
@@ -253,7 +264,7 @@ impl Orbit {
         let order = self.start.len();
         let states = self.states.iter().zip(&tangent.states);
         Self {
-            depth_m: self.depth_m + tangent.along[order] * length * scale.depth_m,
+            value: self.value + tangent.along[order] * length * scale.value,
             start: &self.start + tangent.along.rows(0, order) * (length * scale.state),
             states: states.map(|(states, by)| states + by * length).collect(),
         }
@@ -287,11 +298,11 @@ impl Orbit {
         let mut bend = &before.tangent.along * by_before + &tangent.along * by_own;
         let mut start = bend.rows_mut(0, order);
         start += (&before.orbit.start - &self.start) * (by_orbit / scale.state);
-        bend[order] += (before.orbit.depth_m - self.depth_m) * (by_orbit / scale.depth_m);
+        bend[order] += (before.orbit.value - self.value) * (by_orbit / scale.value);
         let along = tangent.along.dot(&bend);
         let change = scale.unscaled(&(bend - &tangent.along * along));
         predicted.start += change.rows(0, order);
-        predicted.depth_m += change[order];
+        predicted.value += change[order];
         for (index, states) in predicted.states.iter_mut().enumerate() {
             *states += (&before.orbit.states[index] - &self.states[index]) * by_orbit
                 + &before.tangent.states[index] * by_before
@@ -301,9 +312,9 @@ impl Orbit {
     }
 
     /// Corrects a predicted orbit on the hyperplane ⟨normal, z − z_guess⟩ = 0, where z holds the start state and the
-    /// depth, each divided by its unit in `scale`.
+    /// varied parameter, each divided by its unit in `scale`.
     ///
-    /// With a normal along the depth this is Newton's method at fixed depth; with the tangent it passes folds. States
+    /// With a normal along the parameter this is Newton's method at its fixed value; with the tangent it passes folds. States
     /// at the nodes are corrected together with the start. Returns the orbit and its tangent, oriented along `normal`.
     ///
     /// The iteration is not that of `quietcut_numerics::newton`: the states at the nodes are unknowns without equations
@@ -319,17 +330,17 @@ impl Orbit {
         let mut distance = 0.0;
         let mut last = f64::INFINITY;
         for iteration in 0..25 {
-            let depth_mm = orbit.depth_m * 1e3;
+            let place = map.parameter().at(orbit.value);
             let integration = map
-                .integrate(&orbit.start, orbit.depth_m, &orbit.states)
-                .ok_or(OrbitError::NoConvergence { depth_mm })?;
+                .integrate(&orbit.start, orbit.value, &orbit.states)
+                .ok_or(OrbitError::NoConvergence { place })?;
             let mut matrix = DMatrix::zeros(order + 1, order + 1);
             matrix
                 .view_mut((0, 0), (order, order))
                 .copy_from(&integration.periodic());
             matrix
                 .view_mut((0, order), (order, 1))
-                .copy_from(&(integration.by.column(order) * (-scale.depth_m / scale.state)));
+                .copy_from(&(integration.by.column(order) * (-scale.value / scale.state)));
             matrix.row_mut(order).copy_from(&normal.transpose());
             let lu = matrix.lu();
             let mut residual = DVector::zeros(order + 1);
@@ -337,10 +348,10 @@ impl Orbit {
                 .rows_mut(0, order)
                 .copy_from(&((&integration.end - &orbit.start) / scale.state));
             residual[order] = -distance;
-            let step = lu.solve(&residual).ok_or(OrbitError::Singular { depth_mm })?;
+            let step = lu.solve(&residual).ok_or(OrbitError::Singular { place })?;
             let change = scale.unscaled(&step);
             orbit.start += change.rows(0, order);
-            orbit.depth_m += change[order];
+            orbit.value += change[order];
             distance += normal.dot(&step);
             orbit.states = integration.states;
             for (states, values) in orbit.states.iter_mut().zip(&integration.values) {
@@ -348,12 +359,12 @@ impl Orbit {
             }
             let size = step.norm().max(integration.moved);
             if !size.is_finite() || (iteration > 4 && size > 2.0 * last) {
-                return Err(OrbitError::NoConvergence { depth_mm });
+                return Err(OrbitError::NoConvergence { place });
             }
             if size < SETTLED || (last < NEAR && size * (size / last).powi(2) < SETTLED) {
                 let mut unit = DVector::zeros(order + 1);
                 unit[order] = 1.0;
-                let tangent = lu.solve(&unit).ok_or(OrbitError::Singular { depth_mm })?;
+                let tangent = lu.solve(&unit).ok_or(OrbitError::Singular { place })?;
                 let along = tangent.normalize();
                 let change = scale.unscaled(&along);
                 let states = integration.values.iter().zip(&orbit.states);
@@ -364,7 +375,7 @@ impl Orbit {
             last = size;
         }
         Err(OrbitError::NoConvergence {
-            depth_mm: orbit.depth_m * 1e3,
+            place: map.parameter().at(orbit.value),
         })
     }
 }
@@ -375,18 +386,18 @@ fn shaped(values: DVector<f64>, order: usize) -> DMatrix<f64> {
     DMatrix::from_column_slice(order, nodes, values.as_slice())
 }
 
-/// Units of the start state and of the depth (m) in which the arc length along a branch of forced orbits is measured.
+/// Units of the start state and of the varied parameter in which the arc length along a branch of forced orbits is measured.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scale {
     pub(super) state: f64,
-    pub(super) depth_m: f64,
+    pub(super) value: f64,
 }
 
 impl Scale {
-    /// Converts a change of the orbit's start and depth from units of this scale to units of the state and m.
+    /// Converts a change of the orbit's start and parameter from units of this scale to their own units.
     fn unscaled(&self, step: &DVector<f64>) -> DVector<f64> {
         let mut change = step * self.state;
-        change[step.len() - 1] = step[step.len() - 1] * self.depth_m;
+        change[step.len() - 1] = step[step.len() - 1] * self.value;
         change
     }
 }

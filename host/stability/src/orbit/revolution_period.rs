@@ -15,6 +15,7 @@ use num_complex::Complex64;
 
 use super::collocated::Linearized;
 use super::forced::{ForcedProblem, Uneven};
+use super::parameter::Parameter;
 use super::periodic_orbit::{Orbit, PeriodIntegration, PeriodMap, SubintervalNodes};
 use crate::error::Breakdown;
 use crate::problem::revolution_mesh::{Fineness, Flight, RevolutionMesh, Source, Subinterval};
@@ -269,6 +270,10 @@ impl Forces {
 }
 
 impl PeriodMap for RevolutionPeriod<'_> {
+    fn parameter(&self) -> Parameter {
+        Parameter::Depth
+    }
+
     fn problem(&self) -> &ForcedProblem {
         self.problem
     }
@@ -339,13 +344,13 @@ impl PeriodMap for RevolutionPeriod<'_> {
     }
 
     fn multipliers(&self, orbit: &Orbit) -> Result<Vec<Complex64>, Breakdown> {
-        let integration = self.integrate(&orbit.start, orbit.depth_m, &orbit.states);
+        let integration = self.integrate(&orbit.start, orbit.value, &orbit.states);
         let integration = integration.ok_or(Breakdown::NoSolution)?;
         period_map::of_matrix(integration.by.columns(0, self.mesh.size).into_owned())
     }
 
     fn chatter_hz(&self, orbit: &Orbit, multiplier: Complex64) -> Option<f64> {
-        let integration = self.integrate(&orbit.start, orbit.depth_m, &orbit.states)?;
+        let integration = self.integrate(&orbit.start, orbit.value, &orbit.states)?;
         let (size, order) = (self.mesh.size, self.problem.order());
         let by_start = integration.by.columns(0, size);
         let vector = eigenvector(&by_start.map(Complex64::from), multiplier)?;
@@ -371,7 +376,7 @@ impl PeriodMap for RevolutionPeriod<'_> {
         }
         let period_s = self.mesh.passages.period_s;
         let linear = &self.problem.linear;
-        dominant_frequency_hz(linear, orbit.depth_m, period_s, multiplier, |s| {
+        dominant_frequency_hz(linear, orbit.value, period_s, multiplier, |s| {
             let mut harmonic = Vector3::<Complex64>::zeros();
             for (time_s, displacement) in &motion {
                 harmonic += displacement * (-s * *time_s).exp();

@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::branch::Extent;
-use super::follower::{follow_depth, orbit_at};
+use super::branches::{follow_depth, orbit_at};
 use super::forced::{ForcedProblem, Uneven};
 use super::periodic_orbit::{Orbit, PeriodMap};
 use super::revolution_period::*;

@@ -13,12 +13,11 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::collocated::Linearized;
 use super::forced::ForcedProblem;
-use quietcut_model::structure::FirstOrder;
 use quietcut_numerics::quadrature::Gauss;
 
 /// Largest phase angle, rad, of the fastest motion over a subinterval: the fastest pole plus the rotating directional
 /// coefficients.
-const SUBINTERVAL_ANGLE: f64 = 4.0;
+pub(super) const SUBINTERVAL_ANGLE: f64 = 4.0;
 
 /// Gauss nodes per subinterval. Over the phase angle z = [`SUBINTERVAL_ANGLE`] the local error (m!)²
 /// z^{2m+1}/((2m)!(2m+1)!) is then 5e-11. Halving the angle moves the limits of the thesis' robot (chapter 6), with
@@ -72,9 +71,21 @@ impl<'a> ToothPeriod<'a> {
     /// Mesh of the tooth period whose subintervals are so short that the fastest motion rotates by no more than the
     /// phase angle `subinterval_angle`, rad.
     pub(super) fn with_subintervals(problem: &'a ForcedProblem, rpm: f64, subinterval_angle: f64) -> Self {
+        Self::on_mesh_of(rpm, problem, rpm, subinterval_angle)
+    }
+
+    /// The mesh of [`with_subintervals`](Self::with_subintervals) at the speed `mesh_rpm`, with the durations at the
+    /// speed `rpm`: at all speeds from `mesh_rpm` on it is fine enough, with the same number of subintervals.
+    pub(super) fn on_mesh_of(
+        mesh_rpm: f64,
+        problem: &'a ForcedProblem,
+        rpm: f64,
+        subinterval_angle: f64,
+    ) -> Self {
         let linear = &problem.linear;
         let engagement = &linear.process.engagement;
         let seconds_per_radian = linear.tooth_period_s(rpm) / engagement.pitch;
+        let seconds_per_radian_of_mesh = linear.tooth_period_s(mesh_rpm) / engagement.pitch;
         let fastest = linear
             .structure
             .poles()
@@ -88,7 +99,7 @@ impl<'a> ToothPeriod<'a> {
             let length = interval.to - interval.from;
             // Phase angle over the whole interval between entry and exit of teeth: that of the fastest pole, plus that
             // of the directional coefficients, which oscillate at twice the rotation of the tool.
-            let angle = fastest * length * seconds_per_radian + 2.0 * length;
+            let angle = fastest * length * seconds_per_radian_of_mesh + 2.0 * length;
             let count = (angle / subinterval_angle).ceil().max(1.0);
             let turn = length / count;
             for index in 0..count as usize {
@@ -156,22 +167,8 @@ pub(super) fn rates(
         .collect()
 }
 
-/// Derivative of the state's time derivative at a node with respect to the axial depth, per meter.
-pub(super) fn per_depth(
-    structure: &FirstOrder,
-    subinterval: &Subinterval,
-    states: &DMatrix<f64>,
-    node: usize,
-) -> DVector<f64> {
-    let push: DVector<f64> = &structure.b * subinterval.forces[node];
-    match subinterval.damping.get(node) {
-        Some(damping) => push - damping * states.column(node),
-        None => push,
-    }
-}
-
 /// Jacobians ∂f/∂x of the equation of motion at the nodes of a subinterval.
-fn jacobians(
+pub(super) fn jacobians(
     problem: &ForcedProblem,
     subinterval: &Subinterval,
     states: &DMatrix<f64>,

@@ -8,22 +8,21 @@
 use nalgebra::DMatrix;
 
 use super::collocated::Linearized;
-use super::periodic_orbit::Orbit;
 use super::tooth_period::{Subinterval, ToothPeriod};
 use crate::problem::period::{Element, Period, Port};
 
-/// Elements of the delay equation over a tooth period, linearized about a forced orbit; `None` if a subinterval is
-/// singular.
-pub(super) fn about(map: &ToothPeriod<'_>, orbit: &Orbit) -> Option<Period> {
+/// Elements of the delay equation over a tooth period, linearized about a forced orbit at an axial depth, which is
+/// given by its states at the nodes of each subinterval; `None` if a subinterval is singular.
+pub(super) fn about(map: &ToothPeriod<'_>, orbit: &[DMatrix<f64>], depth_m: f64) -> Option<Period> {
     let order = map.problem.order();
     let mut elements = Vec::new();
     let mut flight = DMatrix::identity(order, order);
-    for (subinterval, states) in map.subintervals.iter().zip(&orbit.states) {
-        let linearized = map.linearized(subinterval, states, orbit.depth_m);
+    for (subinterval, states) in map.subintervals.iter().zip(orbit) {
+        let linearized = map.linearized(subinterval, states, depth_m);
         if subinterval.teeth == 0 {
             flight = linearized.flow()?.1 * flight;
         } else {
-            elements.push(element(map, subinterval, states, orbit.depth_m, &linearized)?);
+            elements.push(element(map, subinterval, states, depth_m, &linearized)?);
         }
     }
     Some(Period { elements, flight })

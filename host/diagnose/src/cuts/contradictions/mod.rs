@@ -27,8 +27,10 @@ use self::screen::Screen;
 use self::wide_fit::{WideFit, frequency_costs, wide_fit};
 use super::record::ReducedCut;
 use crate::baseline::Baseline;
+use crate::conclusion::answer::EstimatedCause;
 use crate::criteria::SPEED_AS_STATED;
 use crate::error::{DiagnoseError, FittingInput};
+use crate::records::checks;
 
 /// χ² per value above the noise from which on the given input is refused: that of the allowance of its orders.
 const REFUSED: f64 = 1.0;
@@ -90,6 +92,23 @@ pub(super) fn contradiction(
                 left: *left,
             })
             .collect(),
+    })
+}
+
+/// A channel whose only explanation is the gain of another unit: no sensor errs by as much.
+pub(super) fn unit_of_gain(causes: &[EstimatedCause], recordings: &[Recording]) -> Option<DiagnoseError> {
+    causes.iter().find_map(|cause| {
+        let gain = cause.parameters.get("gain")?.value;
+        let words = checks::unit_of_gain(gain)?;
+        let channel = cause.channel.as_deref()?;
+        let recording = recordings.iter().find(|recording| recording.channel(channel).is_some())?;
+        Some(DiagnoseError::record(
+            &recording.path,
+            format!(
+                "{channel} fits the case if it reads {gain:.3} times the true value, which is about {words}: its unit, \
+                 or that of the case, is wrong; give units in the header as name [unit]"
+            ),
+        ))
     })
 }
 

@@ -121,6 +121,21 @@ fn a_slot_that_is_none_is_said() {
 }
 
 #[test]
+fn a_gain_of_another_unit_is_no_cause() {
+    let machine = &MACHINES[2];
+    let mut records = machine.records(&["force-coefficients=0.08"], 0.01, 5);
+    let fault = Fault::Scaled(Acceleration, 0, 4.448);
+    fault.spoil(&mut machine.case(), &mut records, &[]).unwrap();
+    // The orders alone leave open another machine: the effects decide.
+    assert_eq!(refusal(&machine.case(), &records), None);
+    let error = diagnose(&machine.case(), &records, &Options::default()).unwrap_err();
+    assert!(
+        error.to_string().contains("ax fits the case if it reads 4.4"),
+        "{error}"
+    );
+}
+
+#[test]
 fn a_clock_that_is_off_is_said() {
     let machine = &MACHINES[0];
     let mut records = machine.records(&HIDDEN, 0.01, 5);
