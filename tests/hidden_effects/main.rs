@@ -37,6 +37,7 @@ mod signal;
 mod sliders;
 mod uncertainty;
 mod workshop;
+mod written_case;
 
 use campaign::{Report, Share};
 use puzzle::{Family, Puzzle};
@@ -45,6 +46,7 @@ use quietcut_testkit::rates::{assert_least_share, assert_pooled_share};
 use quietcut_testkit::results::Campaign;
 use rayon::prelude::*;
 use serde_json::Value;
+use written_case::WrittenCase;
 
 /// The answer of the diagnosis; an error is an outcome of its own. Case and recordings are kept if `QUIETCUT_KEEP` names a folder.
 fn ask(puzzle: &Puzzle) -> Value {
@@ -165,6 +167,56 @@ fn a_part_of_the_campaign() {
         }
     }
     check_slice(&reports);
+}
+
+/// Largest relative difference between the prediction error that is promised of a written case and the one that its diagnosis prints:
+/// texts show at most four digits.
+const PROMISED: f64 = 1e-4;
+
+#[test]
+fn the_written_case_keeps_what_was_promised() {
+    let part = [
+        (Family::Sweep, 300),
+        (Family::FreeDecay, 300),
+        (Family::Shaker, 300),
+        (Family::CuttingInWorkshop, 0),
+        (Family::NothingInWorkshop, 6),
+    ];
+    let written: Vec<WrittenCase> = part
+        .into_par_iter()
+        .filter_map(|(family, seed)| WrittenCase::of(&workshop::draw(family, seed)))
+        .collect();
+    assert_eq!(written.len(), part.len(), "each of these writes a case");
+    for case in &written {
+        println!("{case}");
+        assert!(case.broken() < PROMISED, "{case}");
+        assert!(case.further.is_empty(), "{case}");
+    }
+}
+
+#[test]
+#[ignore = "campaign: QUIETCUT_FAMILY, QUIETCUT_SEEDS, QUIETCUT_FIRST_SEED"]
+fn written_cases() {
+    let text = std::env::var("QUIETCUT_FAMILY").unwrap_or_default();
+    let seeds = std::env::var("QUIETCUT_SEEDS").map_or(20, |text| text.parse().unwrap());
+    let first = std::env::var("QUIETCUT_FIRST_SEED").map_or(0, |text| text.parse().unwrap());
+    for family in Family::ALL
+        .into_iter()
+        .filter(|family| family.name().contains(&text))
+    {
+        let written: Vec<WrittenCase> = (first..first + seeds)
+            .into_par_iter()
+            .filter_map(|seed| WrittenCase::of(&workshop::draw(family, seed)))
+            .inspect(|case| println!("{case}"))
+            .collect();
+        let kept = written.iter().filter(|case| case.broken() < PROMISED).count();
+        let alone = written.iter().filter(|case| case.further.is_empty()).count();
+        println!(
+            "{}: of {} written cases {kept} keep what was promised, {alone} lack no further cause",
+            family.name(),
+            written.len()
+        );
+    }
 }
 
 /// Asserts that the shares of a slice of the campaign agree with its requirements: no 99.9 % binomial interval lies outside.

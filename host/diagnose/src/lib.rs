@@ -101,6 +101,7 @@ mod tests;
 pub use conclusion::answer::{self, Diagnosis};
 pub use conclusion::lobes;
 pub use conclusion::missing_force::{AtAmplitude, MissingForce};
+pub use conclusion::places::{Place, PlaceKind};
 pub use conclusion::recorded_cuts::recorded_cuts;
 pub use conclusion::residual_views::{ResidualView, SpindleMotionView};
 pub use conclusion::updates::{BaselineUpdate, Posterior};

@@ -1,5 +1,7 @@
 //! Error-controlled integration with event location: steps end where the right-hand side is not smooth.
 
+use std::ops::Range;
+
 use super::contact::{Change, Contact};
 use super::criteria::{AT_REST, REGIME_CHANGES_MAX, REPEATED_CONTACT_CHANGES_MAX};
 use super::dense_step::{DenseStep, Workspace};
@@ -39,6 +41,8 @@ pub(super) struct Integrator<'a> {
     workspace: Workspace,
     /// The regime of each restoring force, such as stick or slip, in the order of [`Model::restoring_forces`].
     regimes: Vec<Regime>,
+    /// Index ranges of the states that change within a step: all but the memories of restoring forces.
+    moving: Vec<Range<usize>>,
     /// Start and end of the integration step that is evaluated, s, moved inwards by a rounding margin.
     within: [f64; 2],
 }
@@ -80,6 +84,7 @@ impl<'a> Integrator<'a> {
             next_h: 0.0,
             statistics: Statistics::default(),
             regimes: vec![0; model.restoring_forces.len()],
+            moving: moving(model),
             workspace: Workspace::new(model),
             within: [0.0; 2],
         }
@@ -182,7 +187,7 @@ impl<'a> Integrator<'a> {
     }
 
     /// Index range, in the state vector y, of the internal states of restoring force number `index`.
-    fn state_range(&self, index: usize) -> std::ops::Range<usize> {
+    fn state_range(&self, index: usize) -> Range<usize> {
         let restoring_forces = &self.model.restoring_forces;
         let from = self.model.dynamics.order() + restoring_force::states(&restoring_forces[..index]);
         from..from + restoring_forces[index].states()
@@ -334,12 +339,16 @@ impl<'a> Integrator<'a> {
     fn end_of_regime(&self, index: usize, h: f64, workspace: &mut Workspace) -> Option<Event> {
         let (restoring_force, regime) = (&self.model.restoring_forces[index], self.regimes[index]);
         let state_range = self.state_range(index);
+        workspace.state.copy_from_slice(&self.y);
         let workspace = std::cell::RefCell::new(workspace);
         let margin = |u: f64| {
             let mut workspace = workspace.borrow_mut();
             let Workspace { state, rate, .. } = &mut **workspace;
-            for (state, quartic) in state.iter_mut().zip(&self.quartics) {
-                *state = at(quartic, u);
+            for range in &self.moving {
+                let quartics = &self.quartics[range.clone()];
+                for (state, quartic) in state[range.clone()].iter_mut().zip(quartics) {
+                    *state = at(quartic, u);
+                }
             }
             let t = self.t + u * h;
             let holding_n = match restoring_force.holds().filter(|_| restoring_force.locked(regime)) {
@@ -478,4 +487,17 @@ impl<'a> Integrator<'a> {
             displacement_mm: 1e3 * self.amplitude_m(),
         }
     }
+}
+
+fn moving(model: &Model) -> Vec<Range<usize>> {
+    let mut from = model.dynamics.order();
+    let mut moving = vec![0..from];
+    for restoring_force in &model.restoring_forces {
+        let to = from + restoring_force.states();
+        if !restoring_force.remembers() {
+            moving.push(from..to);
+        }
+        from = to;
+    }
+    moving
 }

@@ -14,6 +14,9 @@ use crate::report::digits::significant;
 use crate::report::lobes_change::{sentences, trial_cut_counts};
 use crate::trial_cuts::{self, TrialCut};
 
+/// Number of places of an unexplained residual that the text lists.
+const PLACES_SAID: usize = 5;
+
 /// Finds why the simulation of a case differs from recordings, extends the case, and states the gain in prediction
 /// error.
 #[derive(Debug, clap::Args)]
@@ -208,6 +211,14 @@ fn text(diagnosis: &Diagnosis) -> String {
             100.0 * diagnosis.unexplained.fraction,
             diagnosis.unexplained.location
         ));
+        lines.extend(
+            diagnosis
+                .unexplained
+                .places
+                .iter()
+                .take(PLACES_SAID)
+                .map(|place| format!("  {place}")),
+        );
     }
     lines.extend(diagnosis.unexplained.guess.clone());
     lines.extend(diagnosis.lobes.iter().flat_map(sentences));

@@ -55,6 +55,9 @@ pub fn diagnosis_page(
             (format!("{:.2} % of the residual energy of the case is neither explained nor noise. ", 100.0 * diagnosis.unexplained.fraction))
             @if diagnosis.unexplained.fraction > 0.0 { (diagnosis.unexplained.location) "." }
         }
+        @if !diagnosis.unexplained.places.is_empty() {
+            ul { @for place in &diagnosis.unexplained.places { li { (place.to_string()) } } }
+        }
         @if let Some(guess) = &diagnosis.unexplained.guess { p { (guess) "." } }
         h2 { "Residual of each channel" }
         (all_pictures(diagnosis)?)

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::conclusion::lobes::{Chart, Lobes};
+use crate::conclusion::places::Place;
 use crate::conclusion::residual_views::ResidualView;
 use crate::conclusion::updates::{BaselineUpdate, Posterior};
 
@@ -98,8 +99,8 @@ pub(crate) fn label(causes: &[EstimatedCause]) -> String {
     names.join(" with ")
 }
 
-/// Prediction error of the baseline or of the extended case. That of the extended case is the baseline's times the
-/// square root of the ratio of their χ², unless a long record is validated on its rest.
+/// Prediction error of the baseline or of the extended case: that of the extended case is the one that its own diagnosis prints as
+/// that of its baseline.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Quality {
     /// NRMSE on the held-out segments: the ratio of the RMS residual of a channel in a segment to the RMS of the
@@ -154,6 +155,8 @@ pub struct Unexplained {
     /// which the residual is largest; `none above noise` if only noise is left.
     #[serde(rename = "where")]
     pub location: String,
+    /// The places that hold most of the residual above its noise, largest first; empty if only noise is left.
+    pub places: Vec<Place>,
     /// A formula that may describe the unexplained restoring force: a guess; `None` unless the outcome is `Unexplained`
     /// and a formula explains enough.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -4,8 +4,10 @@ use crate::baseline::uncertain::Uncertain;
 use crate::conclusion::answer::{Diagnosis, EstimatedCause, Gain, Outcome, Quality, Unexplained};
 use crate::conclusion::nearest_baseline::nearest_baseline;
 use crate::conclusion::parameter_estimates::{by_common_factor, parameter_estimates};
+use crate::conclusion::prediction_error::{prediction_error, prediction_error_of};
 use crate::conclusion::residual_views::{ResidualView, residual_views};
 use crate::conclusion::updates::Posterior;
+use crate::conclusion::{places, unexplained};
 use crate::criteria::{
     CHANCE_OF_DOUBT, CONFIDENCE_LOSS, CONFIDENCE_WIDTH, DOUBT, DOUBTFUL_RESIDUAL, EQUIVALENT,
     HIGHEST_CONFIDENCE, NOISE_TOLERANCE, UNEXPLAINED_OF_FORCE, UNEXPLAINED_OF_RESPONSE,
@@ -28,16 +30,6 @@ use quietcut_recording::Recording;
 struct Written<'a> {
     study: &'a Study<'a>,
     regression: Regression,
-}
-
-impl Written<'_> {
-    fn quality(&self) -> Quality {
-        let nrmse = |subset| self.regression.nrmse(self.study, subset);
-        Quality {
-            nrmse_heldout: nrmse(Subset::HeldOut),
-            nrmse_whole: nrmse(Subset::Whole),
-        }
-    }
 }
 
 /// Concludes the diagnosis of records that are not all answered by their orders. What the case states as uncertain of its
@@ -95,13 +87,7 @@ fn answer(
     let inflation = criteria.inflation(regression, selection.best.as_ref());
     let held_out = regression.residual(Subset::HeldOut);
     let count = regression.count(Subset::HeldOut) as f64;
-    let whole = regression.residual(Subset::Whole);
-    let mut diagnosis = of_baseline(written.quality(), library);
-    let nrmse = |subset| regression.nrmse(study, subset);
-    let nearest = Quality {
-        nrmse_heldout: nrmse(Subset::HeldOut),
-        nrmse_whole: nrmse(Subset::Whole),
-    };
+    let mut diagnosis = of_baseline(prediction_error(written.study, &written.regression), library);
     let written_held_out = written.regression.residual(Subset::HeldOut);
     diagnosis.views = views(written, study, library, selection.best.as_ref());
     let (of_noise, of_excess) = criteria.excess(regression, selection.best.as_ref());
@@ -122,18 +108,18 @@ fn answer(
         if of_noise > NOISE_TOLERANCE {
             // No candidate model is accepted: the views show the residual of the baseline.
             diagnosis.views = views(written, study, library, None);
-            diagnosis.unexplained.location = crate::conclusion::unexplained::describe(&diagnosis.views);
+            locate(&mut diagnosis);
             diagnosis.outcome = Outcome::Unexplained;
             diagnosis.unexplained.guess = crate::conclusion::guess::guess(study, regression);
         } else if !diagnosis.updates.is_empty() {
             diagnosis.outcome = Outcome::Update;
-            diagnosis.extended = Some(nearest);
+            diagnosis.extended = extended_error(&mut diagnosis, written, criteria.recordings);
             diagnosis.gain = Some(Gain::new(written_held_out, held_out, count));
         }
         return diagnosis;
     };
     if of_noise > NOISE_TOLERANCE {
-        diagnosis.unexplained.location = crate::conclusion::unexplained::describe(&diagnosis.views);
+        locate(&mut diagnosis);
     }
     let left_held_out = criteria.left_held_out(library, regression, best);
     diagnosis.outcome = Outcome::Cause;
@@ -174,13 +160,25 @@ fn answer(
         let shared = shared_names(library, selection, &who);
         confound(&mut diagnosis, &shared);
     }
-    let share = |left: f64, there: f64| (left / there.max(f64::MIN_POSITIVE)).sqrt();
-    diagnosis.extended = Some(Quality {
-        nrmse_heldout: nearest.nrmse_heldout * share(left_held_out, held_out),
-        nrmse_whole: nearest.nrmse_whole * share(best.fit.left, whole),
-    });
+    diagnosis.extended = extended_error(&mut diagnosis, written, criteria.recordings);
     diagnosis.gain = Some(Gain::new(written_held_out, left_held_out, count));
     diagnosis
+}
+
+/// The prediction error of the extended case; `None`, with a warning, if it cannot be compared with the records.
+fn extended_error(
+    diagnosis: &mut Diagnosis,
+    written: &Written<'_>,
+    recordings: &[Recording],
+) -> Option<Quality> {
+    let case = diagnosis.extended(written.study.baseline.case)?;
+    let error = prediction_error_of(&case, recordings);
+    error
+        .inspect_err(|error| {
+            let reason = format!("the extended case cannot be compared with the records: {error}");
+            diagnosis.warnings.push(reason);
+        })
+        .ok()
 }
 
 /// The answer if the baseline is right, with the warnings of the library, and one more if the prediction error is much
@@ -204,6 +202,7 @@ fn of_baseline(baseline: Quality, library: &Library) -> Diagnosis {
         unexplained: Unexplained {
             fraction: 0.0,
             location: "none above noise".into(),
+            places: Vec::new(),
             guess: None,
         },
         lobes: None,
@@ -216,6 +215,12 @@ fn of_baseline(baseline: Quality, library: &Library) -> Diagnosis {
         updates: Vec::new(),
         views: Vec::new(),
     }
+}
+
+/// Says where the residual that the views show lies.
+fn locate(diagnosis: &mut Diagnosis) {
+    diagnosis.unexplained.location = unexplained::describe(&diagnosis.views);
+    diagnosis.unexplained.places = places::of_views(&diagnosis.views);
 }
 
 /// The residuals of the case as it is, and what its uncertain parameters and `best` leave of them.

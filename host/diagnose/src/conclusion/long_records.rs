@@ -10,6 +10,7 @@
 use crate::baseline::Baseline;
 use crate::conclusion::answer::{Diagnosis, Gain, Outcome, Quality};
 use crate::conclusion::conclude;
+use crate::conclusion::prediction_error::prediction_error;
 use crate::criteria::{NOISE_TOLERANCE, SHORTENED_SHARE, UNEXPLAINED_OF_RESPONSE};
 use crate::error::DiagnoseError;
 use crate::fit::regression::{Regression, Subset};
@@ -160,7 +161,7 @@ impl Residual {
         Ok(Self {
             energy: regression.residual(Subset::Whole),
             count: regression.count(Subset::Whole) as f64,
-            nrmse: regression.nrmse(&study, Subset::Whole),
+            nrmse: prediction_error(&study, &regression).nrmse_whole,
         })
     }
 }

@@ -10,6 +10,8 @@ pub(crate) mod long_records;
 pub(crate) mod missing_force;
 pub(crate) mod nearest_baseline;
 pub(crate) mod parameter_estimates;
+pub(crate) mod places;
+pub(crate) mod prediction_error;
 pub(crate) mod recorded_cuts;
 pub(crate) mod residual_views;
 pub(crate) mod unexplained;

@@ -17,6 +17,8 @@ use crate::signal::noise::rms;
 /// One channel of one record: measured samples, and the residuals of the baseline and of the extended case.
 #[derive(Clone, Debug)]
 pub struct ResidualView {
+    /// Number of the record, from 1 in the order in which they were given.
+    pub number: usize,
     /// File of the recording.
     pub record: String,
     /// Name of the channel.
@@ -80,6 +82,15 @@ impl ResidualView {
             .collect()
     }
 
+    /// The residual of the extended case, or of the baseline if there is no extension.
+    pub(crate) fn unexplained(&self) -> &[f64] {
+        if self.left.is_empty() {
+            &self.residual
+        } else {
+            &self.left
+        }
+    }
+
     /// Root mean squares over the whole record, in the unit of the channel: of the measured samples, of the baseline's
     /// residual, and of the extended case's residual (0 without an extension).
     pub fn sizes(&self) -> [f64; 3] {
@@ -95,7 +106,7 @@ pub(crate) fn residual_views(
     best: Option<&CandidateModel>,
 ) -> Vec<ResidualView> {
     let mut all = Vec::new();
-    for record in &study.records {
+    for (number, record) in study.records.iter().enumerate() {
         let left_by_best = best.map(|best| left_by(study, library, record, best));
         for (index, channel) in record.channels.iter().enumerate() {
             let residual = channel.residual();
@@ -113,6 +124,7 @@ pub(crate) fn residual_views(
                 }
             });
             all.push(ResidualView {
+                number: number + 1,
                 record: record.path.display().to_string(),
                 channel: channel.pickup.name.clone(),
                 unit: channel.pickup.quantity.unit(),
@@ -146,13 +158,7 @@ fn left_by(study: &Study<'_>, library: &Library, record: &Record, best: &Candida
     if record.domain == Domain::Force {
         return left;
     }
-    let sizes: Vec<f64> = record.channels.iter().map(|channel| channel.deviation).collect();
-    let mut decays = record.decays.clone();
-    decays.fit(&left, &sizes);
-    left.iter()
-        .enumerate()
-        .map(|(index, left)| decays.without(index, left))
-        .collect()
+    record.without_decay(&left)
 }
 
 /// Instants at which a tooth passes through immersion angle 0, the teeth taken as equally pitched: number of the tooth

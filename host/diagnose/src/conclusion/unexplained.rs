@@ -18,22 +18,14 @@ const NEAR: usize = 8;
 pub(crate) fn describe(views: &[ResidualView]) -> String {
     let worst = views.iter().max_by(|a, b| {
         let beside_noise =
-            |view: &ResidualView| rms(residual_of(view)) / view.deviation.max(f64::MIN_POSITIVE);
+            |view: &ResidualView| rms(view.unexplained()) / view.deviation.max(f64::MIN_POSITIVE);
         beside_noise(a).total_cmp(&beside_noise(b))
     });
     worst.map_or_else(String::new, of_channel)
 }
 
-fn residual_of(view: &ResidualView) -> &[f64] {
-    if view.left.is_empty() {
-        &view.residual
-    } else {
-        &view.left
-    }
-}
-
 fn of_channel(view: &ResidualView) -> String {
-    let residual = residual_of(view);
+    let residual = view.unexplained();
     let size = rms(residual);
     let mut text = format!(
         "{} of {}: {size:.3e} {} RMS, {:.1} times its noise",

@@ -127,6 +127,22 @@ impl AmplitudeErrors {
         own
     }
 
+    /// Squares of an error of the amplitudes, in variances of the independent errors: by order (row 0 is zero) and channel.
+    pub(crate) fn squared_deviations(&self, error: &DMatrix<Complex64>) -> DMatrix<f64> {
+        let mut squares = DMatrix::zeros(error.nrows(), error.ncols());
+        for (index, whitener) in self.whiteners.iter().enumerate() {
+            // W is triangular with positive diagonal, so that its inverse exists: Σ = 2 W⁻¹W⁻ᴴ.
+            let Some(inverse) = whitener.clone().try_inverse() else {
+                continue;
+            };
+            for channel in 0..error.ncols() {
+                let variance = 2.0 * inverse.row(channel).norm_squared();
+                squares[(index + 1, channel)] = error[(index + 1, channel)].norm_sqr() / variance;
+            }
+        }
+        squares
+    }
+
     /// Values whose errors are independent with unit variance but for what is common.
     fn independent(&self, amplitudes: &DMatrix<Complex64>, trend: Option<&DMatrix<Complex64>>) -> Vec<f64> {
         let mut values = of_orders(&self.whiteners, amplitudes);

@@ -14,6 +14,7 @@ use crate::candidates::cause::Location;
 use crate::conclusion::answer::{
     Diagnosis, EstimatedCause, Figure, Gain, NINETY_PERCENT, Outcome, Quality, Unexplained,
 };
+use crate::conclusion::places;
 use crate::conclusion::updates::Posterior;
 use quietcut_recording::Recording;
 use quietcut_stability::Variable;
@@ -69,6 +70,7 @@ pub(super) fn answer(
             } else {
                 "none above noise".into()
             },
+            places: Vec::new(),
             guess: None,
         },
         lobes: None,
@@ -89,6 +91,13 @@ pub(super) fn answer(
         diagnosis.gain = Some(Gain::new(written.fit.left, extended.fit.left, count));
     }
     diagnosis.views = views::views(written, extended, records, recordings);
+    if left > 0.0 {
+        diagnosis.unexplained.places = views::places(last, records);
+        diagnosis
+            .unexplained
+            .places
+            .extend(places::events(&diagnosis.views));
+    }
     diagnosis
 }
 
@@ -110,7 +119,7 @@ fn posterior(explanation: &Explanation<'_>) -> Option<Posterior> {
 }
 
 /// Prediction error of the orders but 0.
-fn quality(explanation: &Explanation<'_>, records: &[ReducedCut]) -> Quality {
+pub(super) fn quality(explanation: &Explanation<'_>, records: &[ReducedCut]) -> Quality {
     let shares: Vec<f64> = explanation
         .fit
         .errors()

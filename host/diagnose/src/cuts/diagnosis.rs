@@ -1,11 +1,11 @@
 //! Diagnosis of records that are all stable cuts.
 
-use super::answer::answer;
+use super::answer::{answer, quality};
 use super::contradictions::{contradiction, unit_of_gain};
 use super::record::ReducedCut;
-use super::selection::explain;
+use super::selection::{as_written, explain};
 use crate::baseline::Baseline;
-use crate::conclusion::answer::{Diagnosis, Outcome};
+use crate::conclusion::answer::{Diagnosis, Outcome, Quality};
 use crate::error::DiagnoseError;
 use crate::motion::spindle_motion::{SpindleMotion, speed_modulation};
 use crate::progress::Stage;
@@ -80,11 +80,32 @@ pub(crate) fn diagnosed(
         return Ok(None);
     };
     watch(Stage::Answer);
-    let diagnosis = answer(&explanations, &records, recordings);
+    let mut diagnosis = answer(&explanations, &records, recordings);
+    if let Some(extended) = diagnosis.extended(case) {
+        match prediction_error_of(&extended, recordings) {
+            Ok(error) => diagnosis.extended = error.or(diagnosis.extended),
+            Err(error) => diagnosis.warnings.push(format!(
+                "the extended case cannot be compared with the records: {error}"
+            )),
+        }
+    }
     if diagnosis.outcome == Outcome::Cause
         && let Some(error) = unit_of_gain(&diagnosis.causes, recordings)
     {
         return Err(error);
     }
     Ok(Some(diagnosis))
+}
+
+/// Prediction error of a case as it is written: what a diagnosis of it prints of its baseline. `None` if it has no orbit.
+///
+/// # Errors
+/// The case cannot be simulated, or a recording cannot be compared.
+fn prediction_error_of(case: &Case, recordings: &[Recording]) -> Result<Option<Quality>, DiagnoseError> {
+    let baseline = Baseline::new(case)?;
+    let records = recordings
+        .iter()
+        .map(|recording| ReducedCut::new(&baseline, recording))
+        .collect::<Result<Vec<_>, _>>()?;
+    Ok(as_written(&baseline, &records).map(|written| quality(&written, &records)))
 }

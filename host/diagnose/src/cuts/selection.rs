@@ -48,7 +48,7 @@ pub(crate) fn explain<'a>(baseline: &'a Baseline<'a>, records: &[ReducedCut]) ->
     let written = baseline
         .case
         .is_uncertain()
-        .then(|| as_written(&space, records))
+        .then(|| as_written(baseline, records))
         .flatten();
     let mut first = Explanations {
         written,
@@ -83,9 +83,13 @@ pub(crate) fn explain<'a>(baseline: &'a Baseline<'a>, records: &[ReducedCut]) ->
     Some(first)
 }
 
-/// The baseline with the parameters that its case has.
-fn as_written<'a>(space: &Space<'a>, records: &[ReducedCut]) -> Option<Explanation<'a>> {
-    let space = space.as_written();
+/// The baseline with the parameters that its case has; with those within their assumed uncertainty if the case states none.
+pub(crate) fn as_written<'a>(baseline: &'a Baseline<'a>, records: &[ReducedCut]) -> Option<Explanation<'a>> {
+    let space = Space::new(baseline, records);
+    let space = match baseline.case.is_uncertain() {
+        true => space.as_written(),
+        false => space,
+    };
     let fit = fit(&space, records, vec![0.0; space.variables.len()], None)?;
     Some(Explanation {
         evidence: fit.evidence(),

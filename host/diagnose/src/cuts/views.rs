@@ -6,6 +6,7 @@ use num_complex::Complex64;
 use super::record::ReducedCut;
 use super::selection::Explanation;
 use crate::baseline::pickup_of;
+use crate::conclusion::places::{Excess, FALSE_PLACE, Place, PlaceKind, merged};
 use crate::conclusion::residual_views::{ResidualView, SpindleMotionView};
 use crate::orders::circle::Circle;
 use crate::signal::noise::rms;
@@ -34,6 +35,7 @@ pub(super) fn views(
             let asynchronous = series.without(&measured, &own);
             let residual = of(baseline);
             all.push(ResidualView {
+                number: number + 1,
                 record: record.path.display().to_string(),
                 channel: name.clone(),
                 unit: pickup_of(name).map_or("", |pickup| pickup.quantity.unit()),
@@ -120,22 +122,45 @@ impl Samples {
 
 /// The order and channel of the largest deviation of an explanation, in words.
 pub(super) fn place(explanation: &Explanation<'_>, records: &[ReducedCut]) -> String {
-    let mut worst: Option<(f64, String)> = None;
-    for (record, error) in records.iter().zip(explanation.fit.errors()) {
-        for order in 1..error.nrows() {
-            let covariance = &record.orders.covariances[order].matrix;
-            for (index, name) in record.orders.channels.iter().enumerate() {
-                let deviations = error[(order, index)].norm() / covariance[(index, index)].re.sqrt();
-                if worst.as_ref().is_none_or(|(most, _)| deviations > *most) {
-                    let hertz = order as f64 * record.conditions.spindle_hz;
-                    let text = format!(
-                        "{name} of {}: order {order} of the spindle ({hertz:.2} Hz), {deviations:.1} standard deviations of its error",
-                        record.path.display()
-                    );
-                    worst = Some((deviations, text));
-                }
-            }
+    let all = deviations(explanation, records);
+    let worst = all.iter().max_by(|a, b| a.energy.total_cmp(&b.energy));
+    worst.map_or_else(String::new, |worst| {
+        let record = &records[worst.record - 1];
+        format!(
+            "{} of {}: order {} of the spindle ({:.2} Hz), {:.1} standard deviations of its error",
+            worst.channel,
+            record.path.display(),
+            worst.from,
+            worst.from * record.conditions.spindle_hz,
+            worst.energy.sqrt()
+        )
+    })
+}
+
+/// The orders that deviate more than their errors do.
+pub(super) fn places(explanation: &Explanation<'_>, records: &[ReducedCut]) -> Vec<Place> {
+    let mut all = deviations(explanation, records);
+    // The square of a complex deviation is exponential.
+    let most = (all.len() as f64 / FALSE_PLACE).ln();
+    all.retain(|cell| cell.energy > most);
+    all.iter_mut().for_each(|cell| cell.energy -= 1.0);
+    merged(PlaceKind::Order, all, 1.0)
+}
+
+/// The squared deviations of all orders but 0 of an explanation, in variances of their errors.
+fn deviations(explanation: &Explanation<'_>, records: &[ReducedCut]) -> Vec<Excess> {
+    let mut all = Vec::new();
+    for (number, (record, error)) in records.iter().zip(explanation.fit.errors()).enumerate() {
+        let squares = record.errors.squared_deviations(error);
+        for (channel, name) in record.orders.channels.iter().enumerate() {
+            all.extend((1..error.nrows()).map(|order| Excess {
+                record: number + 1,
+                channel: name.clone(),
+                from: order as f64,
+                to: order as f64,
+                energy: squares[(order, channel)],
+            }));
         }
     }
-    worst.map_or_else(String::new, |(_, text)| text)
+    all
 }

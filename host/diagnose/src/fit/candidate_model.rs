@@ -33,6 +33,22 @@ pub(crate) struct CandidateModel {
     pub simulated: Option<Simulated>,
 }
 
+impl CandidateModel {
+    /// The baseline alone.
+    pub(crate) fn without_causes() -> Self {
+        Self {
+            choices: Vec::new(),
+            fit: Fit {
+                coefficients: Vec::new(),
+                covariance: DMatrix::zeros(0, 0),
+                left: 0.0,
+            },
+            parameter_count: 0,
+            simulated: None,
+        }
+    }
+}
+
 /// Result of a prediction-error fit of a candidate model.
 #[derive(Clone, Debug)]
 pub(crate) struct Simulated {

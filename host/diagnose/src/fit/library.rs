@@ -66,8 +66,7 @@ impl Library {
             .collect();
         let mut library = Self {
             causes,
-            candidates: Vec::new(),
-            unexamined: Vec::new(),
+            ..Self::without_causes()
         };
         let mut failed: Vec<(usize, Location, String)> = Vec::new();
         for (cause, location, nonlinear_parameters, columns) in computed {
@@ -87,6 +86,15 @@ impl Library {
         }
         regression.complete();
         library
+    }
+
+    /// A library that knows no cause.
+    pub(crate) fn without_causes() -> Self {
+        Self {
+            causes: Vec::new(),
+            candidates: Vec::new(),
+            unexamined: Vec::new(),
+        }
     }
 
     /// One sentence for each cause at a location where the regressors of all its start values `failed`.

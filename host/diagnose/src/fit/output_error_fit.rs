@@ -3,12 +3,13 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
+use crate::candidates::closed_loop::Extended;
 use crate::criteria::{FAR_BEHIND, FAR_START};
 use crate::fit::candidate_model::{AfterRecords, CandidateModel, Simulated};
 use crate::fit::closed_fit::ClosedFit;
 use crate::fit::library::Library;
 use crate::fit::output_error::OutputError;
-use crate::fit::regression::{Fit, Regression, Subset};
+use crate::fit::regression::{Regression, Subset};
 use crate::fit::search::ROUNDS;
 use crate::fit::unknowns::{
     FreeParameter, ParameterPoint, SearchResult, at_bounds, by_choice, energy, of_baseline,
@@ -52,6 +53,73 @@ impl OutputError<'_> {
             reading: None,
         });
         Some(next)
+    }
+}
+
+impl OutputError<'_> {
+    /// The baseline with the initial states and uncertain parameters that fit best.
+    fn without_causes(
+        &self,
+        library: &Library,
+        nothing: &CandidateModel,
+    ) -> Option<(Vec<FreeParameter>, SearchResult, Extended)> {
+        let (mut problem, mut point) = self.problem(library, nothing)?;
+        point.baseline.clone_from(&self.study.uncertain.nearest);
+        let whole = self.of_subset(Subset::Whole);
+        // The free decay of a linear baseline is that of the regression. That of another begins where the measured motion with its
+        // noise has it, which is far where forces remember their path.
+        let is_linear = self.study.baseline.terms.is_empty();
+        if self.is_free_decay && !is_linear {
+            point = self.near_to_far(&mut problem, point);
+        }
+        // Candidate models fit the uncertain parameters with all their iterations: so does what they are compared with.
+        let rounds = if self.study.uncertain.len() > 0 || !is_linear {
+            ROUNDS
+        } else {
+            BASELINE_ROUNDS
+        };
+        let found = self.search(&mut problem, &whole, point, rounds, f64::INFINITY)?;
+        let slots: Vec<FreeParameter> = problem.slots.iter().map(|(slot, _)| *slot).collect();
+        let extended = problem.extended(self.study, &found.point)?;
+        Some((slots, found, extended))
+    }
+
+    /// Measured less simulated samples of the case alone, by record and channel, without the free decay and the offsets that then fit
+    /// best; `None` if it cannot be simulated.
+    pub(crate) fn left_by_case(&self) -> Option<Vec<Vec<Vec<f64>>>> {
+        let nothing = CandidateModel::without_causes();
+        let (_, found, extended) = self.without_causes(&Library::without_causes(), &nothing)?;
+        let left = self.left_by(&extended, &found.point.starts)?;
+        let records = self.study.records.iter().zip(left);
+        Some(
+            records
+                .map(|(record, left)| record.without_decay(&left))
+                .collect(),
+        )
+    }
+
+    /// Measured less simulated samples, by record and channel.
+    fn left_by(&self, extended: &Extended, starts: &[Vec<f64>]) -> Option<Vec<Vec<Vec<f64>>>> {
+        self.study
+            .records
+            .par_iter()
+            .enumerate()
+            .map(|(index, record)| {
+                let count = record.grid.count();
+                let samples = self
+                    .closed
+                    .simulate(self.study, index, extended, &starts[index], count)?;
+                let left = record.channels.iter().zip(samples).map(|(channel, samples)| {
+                    channel
+                        .measured
+                        .iter()
+                        .zip(samples)
+                        .map(|(measured, simulated)| measured - simulated)
+                        .collect()
+                });
+                Some(left.collect())
+            })
+            .collect()
     }
 }
 
@@ -118,27 +186,8 @@ impl ClosedFit for OutputError<'_> {
     }
 
     fn left_by_baseline(&self, library: &Library, _: &Regression) -> Option<(f64, Option<AfterRecords>)> {
-        let nothing = CandidateModel {
-            choices: Vec::new(),
-            fit: Fit {
-                coefficients: Vec::new(),
-                covariance: DMatrix::zeros(0, 0),
-                left: 0.0,
-            },
-            parameter_count: 0,
-            simulated: None,
-        };
-        let (mut problem, mut point) = self.problem(library, &nothing)?;
-        point.baseline.clone_from(&self.study.uncertain.nearest);
-        let whole = self.of_subset(Subset::Whole);
-        // Candidate models fit the uncertain parameters with all their iterations: so does what they are compared with.
-        let rounds = if self.study.uncertain.len() > 0 {
-            ROUNDS
-        } else {
-            BASELINE_ROUNDS
-        };
-        let found = self.search(&mut problem, &whole, point, rounds, f64::INFINITY)?;
-        let slots: Vec<FreeParameter> = problem.slots.iter().map(|(slot, _)| *slot).collect();
+        let nothing = CandidateModel::without_causes();
+        let (slots, found, _) = self.without_causes(library, &nothing)?;
         Some((found.left, of_baseline(&slots, &found)))
     }
 
@@ -147,25 +196,7 @@ impl ClosedFit for OutputError<'_> {
         let (problem, mut point) = self.problem(library, model)?;
         place(&mut point, simulated);
         let extended = problem.extended(self.study, &point)?;
-        self.study
-            .records
-            .par_iter()
-            .enumerate()
-            .map(|(index, record)| {
-                let count = record.grid.count();
-                let start = &simulated.starts[index];
-                let samples = self.closed.simulate(self.study, index, &extended, start, count)?;
-                let left = record.channels.iter().zip(samples).map(|(channel, samples)| {
-                    channel
-                        .measured
-                        .iter()
-                        .zip(samples)
-                        .map(|(measured, simulated)| measured - simulated)
-                        .collect()
-                });
-                Some(left.collect())
-            })
-            .collect()
+        self.left_by(&extended, &simulated.starts)
     }
 
     fn left_held_out(&self, library: &Library, _: &Regression, model: &CandidateModel) -> Option<f64> {

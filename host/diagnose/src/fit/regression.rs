@@ -13,6 +13,8 @@ use crate::fit::normal_equations::{Products, products};
 use crate::fit::nuisances::Nuisances;
 pub(crate) use crate::fit::segment::Subset;
 use crate::fit::segment::{Nuisance, Segment, split};
+use crate::records::channel::Observed;
+use crate::records::record::Record;
 use crate::records::study::Study;
 use crate::signal::dot::dot;
 
@@ -313,14 +315,22 @@ impl Regression {
     /// Prediction error (NRMSE) of the baseline on a subset, relative to the mean square of each channel over its whole
     /// record; the squares are averaged over all channels of all segments with equal weight.
     pub(crate) fn nrmse(&self, study: &Study<'_>, subset: Subset) -> f64 {
+        let channels = |record: &Record| record.channels.iter().map(Observed::residual).collect();
+        let residuals: Vec<Vec<Vec<f64>>> = study.records.iter().map(channels).collect();
+        self.nrmse_of(study, &residuals, subset)
+    }
+
+    /// The same of residuals by record and channel.
+    pub(crate) fn nrmse_of(&self, study: &Study<'_>, residuals: &[Vec<Vec<f64>>], subset: Subset) -> f64 {
         let (mut sum, mut count) = (0.0_f64, 0.0_f64);
         for segment in self.segments.iter().filter(|segment| segment.subset == subset) {
-            for channel in &study.records[segment.record].channels {
+            let channels = &study.records[segment.record].channels;
+            for (channel, residual) in channels.iter().zip(&residuals[segment.record]) {
                 let energy =
                     |samples: &[f64]| dot(&samples[segment.range.clone()], &samples[segment.range.clone()]);
                 let whole = dot(&channel.measured, &channel.measured) * segment.range.len() as f64
                     / channel.measured.len() as f64;
-                sum += energy(&channel.residual()) / whole.max(f64::MIN_POSITIVE);
+                sum += energy(residual) / whole.max(f64::MIN_POSITIVE);
                 count += 1.0;
             }
         }

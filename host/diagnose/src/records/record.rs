@@ -289,6 +289,17 @@ impl Record {
         }
     }
 
+    /// Residuals by channel, in the response domain, without the free decay of the baseline and the offsets that fit them best.
+    pub(crate) fn without_decay(&self, residuals: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let sizes: Vec<f64> = self.channels.iter().map(|channel| channel.deviation).collect();
+        let mut decays = self.decays.clone();
+        decays.fit(residuals, &sizes);
+        let channels = residuals.iter().enumerate();
+        channels
+            .map(|(index, residual)| decays.without(index, residual))
+            .collect()
+    }
+
     /// Stores the closed-loop prediction, in which the predicted motion determines the chips. The samples in `skipped`
     /// take the value of the prediction along the estimated motion. If an extended case supplied noise-free samples,
     /// the closed-loop prediction replaces them.
