@@ -35,6 +35,20 @@ fn the_guide_leads_to_a_stable_cut() {
         "{diagnosis}"
     );
     assert!(said("diagnose tests/cases/kuka-kr90-full.toml").contains("cubic-stiffness"));
+    // The limits of the robot in the pocket, without and with cubic terms, and their ratio of 1.78.
+    assert!(said("lobes tests/cases/kuka-kr90-half.toml").contains("6.99"));
+    assert!(said("lobes tests/cases/kuka-kr90-half-cubic.toml").contains("12.42"));
+    let branch = said("--strobe");
+    assert!(
+        branch.contains("12.42") && branch.contains("first loss of stability"),
+        "{branch}"
+    );
+    assert!(
+        said("--vary kappa").contains("stable again"),
+        "{}",
+        said("--vary kappa")
+    );
+    assert!(said("--curve torus").contains("torus curve:"));
 
     let drawn = fs::read_to_string(folder.path().join("host/pictures/lobes.svg")).expect("a picture");
     let kept = fs::read_to_string(root().join("host/pictures/lobes.svg")).expect("the picture of the README");
