@@ -15,7 +15,7 @@ use crate::stability::StabilityLoss;
 /// already.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example:\n  quietcut bifurcation tests/cases/kuka-kr90-half-cubic.toml --vary depth --range 0:12 --fix rpm=548 --out branch.svg\n  quietcut bifurcation tests/cases/kuka-kr90-half-cubic.toml --vary kappa --range 0:1 --fix rpm=548 --fix depth_mm=7\n  quietcut bifurcation tests/cases/kuka-kr90-half-cubic.toml --vary depth --range 0:12 --fix rpm=548 --curve torus --in rpm,depth --range 493:592 --out curve.svg"
+    after_help = "Example:\n  quietcut bifurcation tests/cases/kuka-kr90-full-cubic.toml --vary depth --range 0:12 --fix rpm=548.2 --out branch.svg\n  quietcut bifurcation tests/cases/kuka-kr90-full-cubic.toml --vary kappa --range 0:1 --fix rpm=548.2 --fix depth_mm=8\n  quietcut bifurcation tests/cases/kuka-kr90-full-cubic.toml --vary depth --range 0:12 --fix rpm=548.2 --curve torus --in rpm,depth --range 493:592 --out curve.svg"
 )]
 pub struct Args {
     /// The case file: structure, tool, material, cut.
