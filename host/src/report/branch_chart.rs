@@ -1,10 +1,12 @@
 //! Bifurcation diagram: the amplitude of forced orbits over one parameter, with their stability and bifurcations.
 
+use plotters::chart::SeriesLabelPosition;
 use plotters::prelude::{Circle, DashedLineSeries, LineSeries, PathElement};
 use plotters::style::{Color, RGBColor};
 
 use super::picture::{
-    Axes, BLUE, CHATTER, Canvas, INK, Labels, ORANGE, PictureError, VIOLET, axes, draw, label, legend, span,
+    Axes, BLUE, CHATTER, Canvas, INK, Labels, ORANGE, PictureError, VIOLET, axes, draw, label, legend_at,
+    span,
 };
 use crate::orbit::{Branch, BranchPoint, Event};
 use crate::stability::StabilityLoss;
@@ -106,8 +108,15 @@ pub fn branch_chart(
         let mut chart = axes(canvas, &labels, low..high, heights)?;
         draw_strobe(&mut chart, &dots)?;
         draw_runs(&mut chart, &runs(branch, ordinate))?;
-        draw_events(canvas, &mut chart, branch, ordinate)?;
-        legend(&mut chart)
+        let falls = falls(branch, ordinate);
+        draw_events(canvas, &mut chart, (branch, falls), ordinate)?;
+        // In the corner from which the branch bends away.
+        let corner = if falls {
+            SeriesLabelPosition::LowerLeft
+        } else {
+            SeriesLabelPosition::UpperLeft
+        };
+        legend_at(&mut chart, corner)
     })
 }
 
@@ -117,10 +126,16 @@ fn draw_strobe(chart: &mut Axes<'_, '_>, dots: &[(f64, f64)]) -> Result<(), Pict
     }
     let color = CHATTER.mix(0.35);
     chart
-        .draw_series(dots.iter().map(|&dot| Circle::new(dot, 1, color.filled())))?
+        .draw_series(dots.iter().map(|&dot| Circle::new(dot, 3, color.filled())))?
         .label("simulated cuts, once per tooth")
-        .legend(move |(x, y)| Circle::new((x + 9, y), 2, CHATTER.filled()));
+        .legend(move |(x, y)| Circle::new((x + 9, y), 3, color.filled()));
     Ok(())
+}
+
+/// True if a diagram of a branch falls from its first orbit to its last.
+fn falls(branch: &Branch, ordinate: Ordinate) -> bool {
+    let height = |at: Option<&BranchPoint>| at.map_or(0.0, |at| ordinate.of_point(at).1);
+    height(branch.points.last()) < height(branch.points.first())
 }
 
 /// Direction in which the orbits of a branch are largest.
@@ -212,7 +227,7 @@ pub(super) fn look(kind: StabilityLoss) -> (RGBColor, &'static str) {
 fn draw_events(
     canvas: &Canvas<'_>,
     chart: &mut Axes<'_, '_>,
-    branch: &Branch,
+    (branch, falls): (&Branch, bool),
     ordinate: Ordinate,
 ) -> Result<(), PictureError> {
     let begins_stable = branch.points.first().is_some_and(|point| point.outside == 0);
@@ -242,7 +257,9 @@ fn draw_events(
         let origin = canvas.get_base_pixel();
         chart.draw_series([Circle::new(at(event), 9, color.stroke_width(2))])?;
         let words = format!("first loss: {name}");
-        label(canvas, (x - origin.0 + 13, y - origin.1 + 6), &words, color)?;
+        // On the side of the branch to which it does not bend.
+        let above = if falls { -28 } else { 12 };
+        label(canvas, (x - origin.0 + 10, y - origin.1 + above), &words, color)?;
     }
     Ok(())
 }

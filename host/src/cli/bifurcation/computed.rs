@@ -151,7 +151,7 @@ impl Broken {
 fn advice(cause: OrbitError) -> &'static str {
     match cause {
         OrbitError::NoConvergence { .. } => {
-            "a softening structure may have no orbit beyond; end --range there, begin it at the other end, or reach the place by \
+            "a softening structure may have no orbit beyond, and a resonance without damping none of finite size; end --range there, begin it at the other end, or reach the place by \
              another parameter (--vary)"
         }
         OrbitError::Lost { .. } => {
