@@ -35,8 +35,6 @@ mod variation;
 mod varied_period;
 
 #[cfg(test)]
-mod criticality_tests;
-#[cfg(test)]
 mod follower_tests;
 #[cfg(test)]
 mod revolution_period_tests;

@@ -1,22 +1,33 @@
-//! Criticality of losses of the robot of chapter 6 against integration in time.
+//! Criticality of losses of the robot of chapter 6, from the normal form, against integration in time.
 
-use quietcut_model::case::Case;
-use quietcut_simulate::{Entry, Regeneration, Settings, SimulateError, VirtualCut, Workspace};
+#![allow(clippy::unwrap_used)]
 
-use super::branch::{Event, Extent};
-use super::branches::{follow, multiplier_at};
-use super::criticality::{Criticality, criticality};
-use super::forced::ForcedProblem;
-use super::parameter::Parameter;
-use crate::spectrum::stability_loss::StabilityLoss;
+use quietcut::case::Case;
+use quietcut::orbit::{Criticality, Event, Extent, ForcedProblem, Parameter, criticality, follow};
+use quietcut::simulate::{Entry, Regeneration, Settings, SimulateError, VirtualCut, Workspace};
+use quietcut::stability::StabilityLoss;
+use quietcut_tests::command::cases;
 
 /// Spindle speed, rev/min, of a tooth period τ in the dimensionless units of chapter 6.
 fn rpm(tau: f64) -> f64 {
     30.0 * 109.641_6 / tau
 }
 
+fn case(name: &str) -> Case {
+    Case::read(&cases().join(format!("{name}.toml"))).unwrap()
+}
+
 fn robot() -> Case {
-    quietcut_testkit::case("kuka-kr90-full-cubic")
+    case("kuka-kr90-full-cubic")
+}
+
+/// Largest Floquet multiplier of the forced orbit at a depth, less 1.
+fn excess(problem: &ForcedProblem, rpm: f64, depth_mm: f64) -> f64 {
+    let setting = problem.setting(rpm, 0.0);
+    let branch = follow(problem, setting, Parameter::Depth, [0.0, depth_mm], Extent::Whole).unwrap();
+    let last = branch.points.last().unwrap();
+    assert!((last.value / depth_mm - 1.0).abs() < 1e-12);
+    last.multiplier_abs - 1.0
 }
 
 fn first_loss(problem: &ForcedProblem, rpm: f64) -> (Event, Criticality) {
@@ -69,15 +80,14 @@ fn spreads(case: &Case, rpm: f64, depth_mm: f64, windows: usize) -> Vec<[f64; 2]
 
 #[test]
 fn the_vibration_beyond_a_supercritical_torus_has_the_size_of_the_normal_form() {
-    let case = robot();
-    let problem = ForcedProblem::new(&case).unwrap();
+    let robot = robot();
+    let problem = ForcedProblem::new(&robot).unwrap();
     let speed = rpm(4.0);
     let (event, found) = first_loss(&problem, speed);
     assert!(found.is_supercritical(), "{found:?}");
     let depth_mm = 1.02 * event.value;
-    let [_, fine] = multiplier_at(&problem, speed, depth_mm).unwrap();
-    let predicted = found.spread_mm(fine.multiplier.norm() - 1.0).unwrap();
-    let simulated = spreads(&case, speed, depth_mm, 25);
+    let predicted = found.spread_mm(excess(&problem, speed, depth_mm)).unwrap();
+    let simulated = spreads(&robot, speed, depth_mm, 25);
     let last = simulated.last().unwrap();
     println!("predicted {predicted:?} mm, simulated {last:?} mm");
     assert_eq!(simulated.len(), 25);
@@ -94,15 +104,15 @@ fn the_vibration_beyond_a_supercritical_torus_has_the_size_of_the_normal_form() 
 
 #[test]
 fn beyond_a_subcritical_torus_the_motion_escapes_and_before_it_settles() {
-    let case = robot();
-    let problem = ForcedProblem::new(&case).unwrap();
+    let robot = robot();
+    let problem = ForcedProblem::new(&robot).unwrap();
     let speed = rpm(6.0);
     let (event, found) = first_loss(&problem, speed);
     assert!(
         !found.is_supercritical() && found.spread_mm(-1e-3).is_some(),
         "{found:?}"
     );
-    let beyond = spreads(&case, speed, 1.005 * event.value, 20);
+    let beyond = spreads(&robot, speed, 1.005 * event.value, 20);
     assert!(beyond.len() < 20, "{beyond:?}");
 }
 
@@ -112,7 +122,7 @@ fn the_flip_of_the_robot_is_supercritical_and_a_linear_structure_has_no_critical
     let (event, found) = first_loss(&problem, rpm(3.13));
     assert_eq!(event.kind, StabilityLoss::Flip);
     assert!(found.is_supercritical(), "{found:?}");
-    let linear = ForcedProblem::new(&quietcut_testkit::case("kuka-kr90-full")).unwrap();
+    let linear = ForcedProblem::new(&case("kuka-kr90-full")).unwrap();
     let setting = linear.setting(rpm(4.0), 0.0);
     let range = [0.0, 15.0];
     let branch = follow(&linear, setting, Parameter::Depth, range, Extent::FirstLoss).unwrap();
