@@ -103,7 +103,7 @@ fn the_vibration_beyond_a_supercritical_torus_has_the_size_of_the_normal_form() 
 }
 
 #[test]
-fn beyond_a_subcritical_torus_the_motion_escapes_and_before_it_settles() {
+fn beyond_a_subcritical_torus_the_motion_escapes() {
     let robot = robot();
     let problem = ForcedProblem::new(&robot).unwrap();
     let speed = rpm(6.0);

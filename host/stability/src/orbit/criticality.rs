@@ -255,10 +255,10 @@ impl ModeSystem<'_> {
             for i in 0..nodes {
                 let mut block = right.view_mut((i * order, 0), (order, columns));
                 block += &here;
-                for j in 0..nodes {
+                for (j, of_node) in matrices.iter().enumerate() {
                     let weight = Complex64::from(piece.duration_s * self.integrals[(i, j)]);
                     let mut entry = matrix.view_mut((i * order, j * order), (order, order));
-                    entry -= &matrices[j] * weight;
+                    entry -= of_node * weight;
                     if let Some(force) = forced(j) {
                         for mut column in block.column_iter_mut() {
                             column.axpy(weight, force, Complex64::from(1.0));
@@ -267,9 +267,9 @@ impl ModeSystem<'_> {
                 }
             }
             let values = matrix.lu().solve(&right)?;
-            for j in 0..nodes {
+            for (j, of_node) in matrices.iter().enumerate() {
                 let weight = Complex64::from(piece.duration_s * self.weights[j]);
-                here += (&matrices[j] * values.rows(j * order, order)) * weight;
+                here += (of_node * values.rows(j * order, order)) * weight;
                 if let Some(force) = forced(j) {
                     for mut column in here.column_iter_mut() {
                         column.axpy(weight, force, Complex64::from(1.0));
