@@ -35,6 +35,22 @@ fn the_guide_leads_to_a_stable_cut() {
         "{diagnosis}"
     );
     assert!(said("diagnose tests/cases/kuka-kr90-full.toml").contains("cubic-stiffness"));
+    // The limits of the robot in the pocket, without and with cubic terms, and the share of cubic damping that a cut needs.
+    assert!(said("lobes tests/cases/kuka-kr90-half.toml").contains("6.98"));
+    assert!(said("lobes tests/cases/kuka-kr90-half-cubic.toml").contains("12.46"));
+    let branch = said("--strobe");
+    assert!(
+        branch.contains("12.46") && branch.contains("first loss of stability"),
+        "{branch}"
+    );
+    let stiffness = said("--vary kappa");
+    assert!(stiffness.contains("0 bifurcations"), "{stiffness}");
+    let damping = said("--vary nu");
+    assert!(
+        damping.contains("0.5979") && damping.contains("stable again"),
+        "{damping}"
+    );
+    assert!(said("--curve torus").contains("torus curve:"));
 
     let drawn = fs::read_to_string(folder.path().join("host/pictures/lobes.svg")).expect("a picture");
     let kept = fs::read_to_string(root().join("host/pictures/lobes.svg")).expect("the picture of the README");

@@ -10,12 +10,19 @@ use quietcut_tests::command::{cases, folder, quietcut};
 use quietcut_tests::documents::assert_generated;
 
 /// The snapshots: the name of each, and its commands. Their files come from the commands before them.
-const OUTPUTS: [(&str, &[&str]); 8] = [
+const OUTPUTS: [(&str, &[&str]); 9] = [
     (
         "lobes",
         &[
             "lobes case.toml --at 1045,2",
             "lobes case.toml --rpm 900:1000:2 --depth-mm 0.1:3:10",
+        ],
+    ),
+    (
+        "bifurcation",
+        &[
+            "bifurcation case.toml --vary depth --range 0:4 --fix rpm=1045",
+            "bifurcation case.toml --vary depth --range 0:3 --fix rpm=1200 --curve torus --in rpm,depth --range 1190:1210 --out curve.svg",
         ],
     ),
     (

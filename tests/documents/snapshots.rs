@@ -51,6 +51,8 @@ fn messages_of_bad_usage_are_as_reviewed() {
         &["lobes", "broken.toml", "--at", "1000,1"],
         &["lobes", "empty.toml", "--at", "1000,1"],
         &["lobes", "empty.toml", "--rpm", "600:2400", "--depth-mm", "1:2:3"],
+        &["bifurcation", "empty.toml", "--vary", "depth", "--range", "0:2"],
+        &["bifurcation", "empty.toml", "--vary", "speed", "--range", "0:2"],
         &["replay", "missing.csv"],
         &["replay", "missing.csv", "--teeth", "0"],
         &["table", "--show", "missing.qct"],
@@ -75,6 +77,8 @@ fn shapes_of_json_answers_are_as_reviewed() {
     for line in [
         "lobes case.toml --at 1045,2",
         "lobes case.toml --rpm 900:1000:2 --depth-mm 0.1:3:10",
+        "bifurcation case.toml --vary depth --range 0:3:2 --fix rpm=1200 --strobe",
+        "bifurcation case.toml --vary depth --range 0:3 --fix rpm=1200 --curve torus --in rpm,depth --range 1190:1210",
         "simulate case.toml --rpm 900 --depth-mm 1 --seconds 3 --out cut.csv",
         "table case.toml --rpm 900:1000:2 --out case.qct",
         "table --show case.qct",

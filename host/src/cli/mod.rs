@@ -5,6 +5,7 @@
 //! status 1: any other failure. An output file is complete or unchanged.
 
 mod assumed;
+pub mod bifurcation;
 mod channels;
 mod counted;
 pub mod demo;
@@ -81,6 +82,7 @@ enum Verb {
     Identify(Box<identify::Args>),
     Diagnose(diagnose::Args),
     Lobes(lobes::Args),
+    Bifurcation(Box<bifurcation::Args>),
     Plan(plan::Args),
     Table(table::Args),
     Upload(upload::Args),
@@ -181,6 +183,7 @@ impl Verb {
             Self::Frf(_) => Some("estimating frequency responses"),
             Self::Identify(_) => Some("identifying"),
             Self::Lobes(_) => Some("computing stability limits"),
+            Self::Bifurcation(_) => Some("following orbits"),
             Self::Table(_) => Some("building the lobe table"),
             Self::Replay(_) => Some("reading the recording"),
             _ => None,
@@ -199,6 +202,7 @@ fn run(verb: Verb) -> Result<(), Error> {
         Verb::Identify(args) => identify::run(*args),
         Verb::Diagnose(args) => diagnose::run(args),
         Verb::Lobes(args) => lobes::run(args),
+        Verb::Bifurcation(args) => bifurcation::run(*args),
         Verb::Plan(args) => plan::run(args),
         Verb::Table(args) => table::run(args),
         Verb::Upload(args) => upload::run(args),

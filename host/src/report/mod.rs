@@ -2,8 +2,10 @@
 
 pub mod answer;
 pub mod backbone_chart;
+pub mod branch_chart;
 pub mod cell_map;
 pub mod comparison;
+pub mod curve_chart;
 pub mod diagnosis;
 pub mod digits;
 pub mod frf_chart;

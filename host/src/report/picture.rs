@@ -47,9 +47,17 @@ pub(super) fn text(size: u32, color: RGBColor) -> TextStyle<'static> {
 
 /// Draws the legend in the upper right corner of the axes.
 pub(super) fn legend<'a: 'c, 'c>(chart: &mut Axes<'a, 'c>) -> Result<(), PictureError> {
+    legend_at(chart, SeriesLabelPosition::UpperRight)
+}
+
+/// Draws the legend at a position of the axes.
+pub(super) fn legend_at<'a: 'c, 'c>(
+    chart: &mut Axes<'a, 'c>,
+    position: SeriesLabelPosition,
+) -> Result<(), PictureError> {
     chart
         .configure_series_labels()
-        .position(SeriesLabelPosition::UpperRight)
+        .position(position)
         .background_style(WHITE.mix(0.8))
         .border_style(GRID)
         .label_font(text(12, INK))

@@ -2,7 +2,7 @@
 //! (characteristic multipliers).
 
 use num_complex::Complex64;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::parameter::Parameter;
 use super::periodic_orbit::{Orbit, OrbitError};
@@ -10,13 +10,15 @@ use crate::limits::speed_line::{Limit, SpeedLine, Switch, union};
 use crate::spectrum::stability_loss::StabilityLoss;
 
 /// Forced orbit on a branch, given by its depth, amplitude and stability.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BranchPoint {
     /// Value of the varied parameter: axial depth, mm, spindle speed, rev/min, feed per tooth, mm, κ or ν.
     pub value: f64,
     /// Half the peak-to-peak displacement of the tool on the orbit, at the collocation nodes, in feed, normal and axial
     /// direction, mm.
     pub amplitude_mm: [f64; 3],
+    /// Displacement of the tool at the start of the period, when a tooth enters, in the same directions, mm.
+    pub displacement_mm: [f64; 3],
     /// Absolute value of the largest Floquet multiplier of the orbit.
     pub multiplier_abs: f64,
     /// Number of Floquet multipliers of the orbit outside the unit circle.
@@ -36,12 +38,19 @@ pub struct Event {
     pub kind: StabilityLoss,
     /// True if the multiplier moves into the unit circle along the branch.
     pub gain: bool,
+    /// Number of orbits of the branch before the bifurcation.
+    #[serde(skip)]
+    pub after: usize,
     /// Multiplier at the crossing.
     #[serde(skip)]
     pub multiplier: Complex64,
     /// Forced orbit at the bifurcation.
     #[serde(skip)]
     pub orbit: Orbit,
+    /// Amplitude of that orbit, as [`BranchPoint::amplitude_mm`].
+    pub amplitude_mm: [f64; 3],
+    /// Displacement on that orbit at the start of the period, as [`BranchPoint::displacement_mm`].
+    pub displacement_mm: [f64; 3],
     /// Frequency of the vibration that begins or ends at the bifurcation, Hz; `None` at a fold, or if it cannot be
     /// computed.
     pub chatter_hz: Option<f64>,

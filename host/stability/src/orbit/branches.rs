@@ -4,6 +4,7 @@
 use num_complex::Complex64;
 
 use super::branch::{Branch, BrokenBranch, Extent};
+use super::branch_record::{BranchJournal, Unrecorded};
 #[cfg(test)]
 use super::follower::orbit_at_depth;
 use super::follower::{Follower, size_at};
@@ -53,6 +54,21 @@ pub fn follow(
     range: [f64; 2],
     extent: Extent,
 ) -> Result<Branch, BrokenBranch> {
+    follow_recorded(problem, setting, parameter, range, extent, &mut Unrecorded)
+}
+
+/// As [`follow`], with every orbit recorded in a journal; goes on from the orbits that it has recorded before.
+///
+/// # Errors
+/// As [`follow`]; or the journal fails, or its orbits are none of this branch.
+pub fn follow_recorded(
+    problem: &ForcedProblem,
+    setting: Setting,
+    parameter: Parameter,
+    range: [f64; 2],
+    extent: Extent,
+    journal: &mut dyn BranchJournal,
+) -> Result<Branch, BrokenBranch> {
     let none = |cause| BrokenBranch { cause, branch: None };
     check(problem, parameter).map_err(none)?;
     let [from, to] = range.map(|value| value * parameter.result_unit());
@@ -64,7 +80,9 @@ pub fn follow(
         Parameter::Depth | Parameter::Feed => size_at(&map, from.max(to)),
         Parameter::Rpm | Parameter::Kappa | Parameter::Nu => start.start.norm(),
     };
-    Follower::over([from, to], map, first.rpm, state).whole(&start, extent)
+    Follower::over([from, to], map, first.rpm, state)
+        .landing()
+        .whole(&start, extent, journal)
 }
 
 /// Refuses a parameter on which the orbits of a problem do not depend, or that is not covered.

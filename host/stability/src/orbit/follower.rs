@@ -6,15 +6,13 @@
 
 use nalgebra::DVector;
 use num_complex::Complex64;
-use quietcut_numerics::roots::SignChange;
 
 use super::branch::{Branch, BranchPoint, BrokenBranch, Event, Extent};
-use super::pairing::{FOLLOWED, nearest, pair, share_of_distance};
+use super::branch_record::{BranchJournal, BranchRecord, Unrecorded};
+use super::pairing::{FOLLOWED, pair, share_of_distance};
 use super::parameter::Place;
 use super::periodic_orbit::{Orbit, OrbitError, PeriodMap, Predecessor, Scale, Tangent};
-use crate::criteria::{
-    BRANCH_STEP_CLEAR, BRANCH_STEP_MAX, BRANCH_STEP_MIN, CIRCLE_SHARE_MAX, LEAST_ERROR, ORBIT_ROOM,
-};
+use crate::criteria::{BRANCH_STEP_CLEAR, BRANCH_STEP_MAX, BRANCH_STEP_MIN, CIRCLE_SHARE_MAX};
 use crate::spectrum::stability_loss::StabilityLoss;
 
 /// Largest number of steps of a branch, failed ones included: ten times the hundred that a branch up and down takes
@@ -47,24 +45,29 @@ pub(super) fn size_at(map: &impl PeriodMap, value: f64) -> f64 {
         .unwrap_or(1.0)
 }
 
+/// Multipliers of an orbit, each with that of the next orbit that it becomes.
+type Pairs = Vec<(Complex64, Complex64)>;
+
 pub(super) struct Follower<M> {
     pub(super) map: M,
-    rpm: f64,
-    scale: Scale,
+    pub(super) rpm: f64,
+    pub(super) scale: Scale,
     /// First and last value of the parameter, in the unit of computations.
-    range: [f64; 2],
+    pub(super) range: [f64; 2],
+    /// True if the last orbit of a branch lies exactly at an end of the range, not one step beyond it.
+    pub(super) lands: bool,
 }
 
 /// Orbit with its Floquet multipliers.
 #[derive(Clone)]
 pub(super) struct Sample {
     pub(super) orbit: Orbit,
-    tangent: Tangent,
+    pub(super) tangent: Tangent,
     /// Orbit from which this one was reached; `None` for the first one of a branch.
-    before: Option<Predecessor>,
+    pub(super) before: Option<Predecessor>,
     /// Floquet multipliers of the orbit near or outside the unit circle, in the upper half plane or on the real axis.
-    roots: Vec<Complex64>,
-    largest: f64,
+    pub(super) roots: Vec<Complex64>,
+    pub(super) largest: f64,
 }
 
 impl Sample {
@@ -98,7 +101,13 @@ impl<M: PeriodMap> Follower<M> {
             rpm,
             scale,
             range,
+            lands: false,
         }
+    }
+
+    /// The same follower, whose branches end exactly at an end of the range.
+    pub(super) fn landing(self) -> Self {
+        Self { lands: true, ..self }
     }
 
     /// Forced orbit with its multipliers at a depth, reached by continuation from depth 0.
@@ -141,12 +150,18 @@ impl<M: PeriodMap> Follower<M> {
 
     /// Follows the branch that starts from rest at depth 0.
     pub(super) fn follow(&self, extent: Extent) -> Result<Branch, OrbitError> {
-        self.whole(&Orbit::rest(&self.map), extent)
+        self.whole(&Orbit::rest(&self.map), extent, &mut Unrecorded)
             .map_err(|broken| broken.cause)
     }
 
-    /// Follows the branch through an orbit at the first value of the range.
-    pub(super) fn whole(&self, start: &Orbit, extent: Extent) -> Result<Branch, BrokenBranch> {
+    /// Follows the branch through an orbit at the first value of the range, and on from the orbits that a journal has
+    /// recorded.
+    pub(super) fn whole(
+        &self,
+        start: &Orbit,
+        extent: Extent,
+        journal: &mut dyn BranchJournal,
+    ) -> Result<Branch, BrokenBranch> {
         let order = self.map.size();
         let mut towards = DVector::zeros(order + 1);
         towards[order] = (self.range[1] - self.range[0]).signum();
@@ -159,7 +174,7 @@ impl<M: PeriodMap> Follower<M> {
             points: vec![self.point(&here)],
             events: Vec::new(),
         };
-        match self.extend(&mut branch, here, extent) {
+        match self.extend(&mut branch, here, extent, journal) {
             Ok(()) => Ok(branch),
             Err(cause) => Err(BrokenBranch {
                 cause,
@@ -168,17 +183,29 @@ impl<M: PeriodMap> Follower<M> {
         }
     }
 
-    /// Appends to a branch what follows its last orbit.
-    fn extend(&self, branch: &mut Branch, mut here: Sample, extent: Extent) -> Result<(), OrbitError> {
-        let [low, high] = [self.range[0].min(self.range[1]), self.range[0].max(self.range[1])];
-        let mut step = BRANCH_STEP_MAX;
-        for _ in 0..STEPS_MAX {
+    /// Appends to a branch that has only its first orbit what follows.
+    fn extend(
+        &self,
+        branch: &mut Branch,
+        first: Sample,
+        extent: Extent,
+        journal: &mut dyn BranchJournal,
+    ) -> Result<(), OrbitError> {
+        let unfit = OrbitError::Journal {
+            place: self.place(&first.orbit),
+        };
+        let records = journal.recorded();
+        let (mut here, mut step) = self.resumed(branch, first, &records).ok_or(unfit)?;
+        for _ in records.len()..STEPS_MAX {
+            if self.is_at_end(branch, &here, extent) {
+                return Ok(());
+            }
             let place = self.place(&here.orbit);
             let next = self.step(&here, step).and_then(|next| {
                 let pairs = pair(&here.roots, &next.roots, step <= 2.0 * BRANCH_STEP_MIN);
                 Ok((next, pairs.ok_or(OrbitError::NoConvergence { place })?))
             });
-            let (next, pairs) = match next {
+            let (mut next, mut pairs) = match next {
                 Ok(found) => found,
                 Err(error) if step <= BRANCH_STEP_MIN => return Err(error),
                 Err(_) => {
@@ -191,31 +218,78 @@ impl<M: PeriodMap> Follower<M> {
                 step = BRANCH_STEP_MAX;
                 continue;
             }
+            if let Some(landed) = self.landed(&here, &next, step) {
+                (next, pairs, step) = landed;
+            }
             let mut events: Vec<(f64, Event)> = pairs
                 .iter()
                 .filter(|(from, to)| (from.norm() > 1.0) != (to.norm() > 1.0))
                 .filter_map(|&(from, to)| self.refine(&here, step, from, to))
                 .collect();
             events.sort_by(|a, b| a.0.total_cmp(&b.0));
-            branch.events.extend(events.into_iter().map(|(_, event)| event));
+            let after = branch.points.len();
+            let events = events.into_iter().map(|(_, event)| Event { after, ..event });
+            let events: Vec<Event> = events.collect();
             here = next;
-            branch.points.push(self.point(&here));
-            let lost = extent == Extent::FirstLoss && branch.events.iter().any(|event| !event.gain);
-            if lost || here.orbit.value >= high || here.orbit.value <= low {
-                return Ok(());
-            }
             // The share that a multiplier moves grows with the step; four fifths of the largest leave room for its
             // acceleration.
             let clear = (0.8 * CIRCLE_SHARE_MAX / share * step).clamp(BRANCH_STEP_MAX, BRANCH_STEP_CLEAR);
-            step = (1.5 * step).min(clear);
+            let next_step = (1.5 * step).min(clear);
+            let point = self.point(&here);
+            let record = BranchRecord::new((&here.orbit, &here.tangent), [step, next_step], &point, &events);
+            branch.points.push(point);
+            branch.events.extend(events);
+            step = next_step;
+            if !journal.record(&record) {
+                return Err(OrbitError::Journal {
+                    place: self.place(&here.orbit),
+                });
+            }
         }
         Err(OrbitError::NoConvergence {
             place: self.place(&here.orbit),
         })
     }
 
+    /// Lower and upper end of the range.
+    fn ends(&self) -> [f64; 2] {
+        [self.range[0].min(self.range[1]), self.range[0].max(self.range[1])]
+    }
+
+    /// The orbit at the end of the range that a step passes, with the pairs of its multipliers and the length of the step
+    /// to it; `None` if the step passes no end, if the branch need not land there, or if the orbit is not found.
+    fn landed(&self, here: &Sample, next: &Sample, step: f64) -> Option<(Sample, Pairs, f64)> {
+        let [low, high] = self.ends();
+        let value = next.orbit.value;
+        let passed = [low, high]
+            .into_iter()
+            .find(|end| (here.orbit.value - end) * (value - end) < 0.0);
+        let end = passed.filter(|_| self.lands)?;
+        let share = (end - here.orbit.value) / (value - here.orbit.value);
+        let mut guess = self.predicted(here, share * step);
+        guess.value = end;
+        let mut along = DVector::zeros(self.map.size() + 1);
+        along[self.map.size()] = (end - here.orbit.value).signum();
+        let mut landed = self.sample(&guess, &along).ok()?;
+        landed.before = Some(Predecessor {
+            orbit: here.orbit.clone(),
+            tangent: here.tangent.clone(),
+            step: share * step,
+        });
+        let pairs = pair(&here.roots, &landed.roots, step <= 2.0 * BRANCH_STEP_MIN)?;
+        Some((landed, pairs, share * step))
+    }
+
+    /// True if a branch is followed far enough with its last orbit.
+    fn is_at_end(&self, branch: &Branch, last: &Sample, extent: Extent) -> bool {
+        let [low, high] = self.ends();
+        let lost = extent == Extent::FirstLoss && branch.events.iter().any(|event| !event.gain);
+        let value = last.orbit.value;
+        branch.points.len() > 1 && (lost || value >= high || value <= low)
+    }
+
     /// Forced orbit with its multipliers one step further along the branch.
-    fn step(&self, from: &Sample, step: f64) -> Result<Sample, OrbitError> {
+    pub(super) fn step(&self, from: &Sample, step: f64) -> Result<Sample, OrbitError> {
         let mut next = self.sample(&self.predicted(from, step), &from.tangent.along)?;
         next.before = Some(Predecessor {
             orbit: from.orbit.clone(),
@@ -234,14 +308,18 @@ impl<M: PeriodMap> Follower<M> {
     }
 
     /// Value of the parameter at the forced orbit one step further along the branch.
-    fn value(&self, from: &Sample, step: f64) -> Result<f64, OrbitError> {
+    pub(super) fn value(&self, from: &Sample, step: f64) -> Result<f64, OrbitError> {
         let guess = self.predicted(from, step);
         let (orbit, _) = Orbit::correct(&self.map, &guess, self.scale, &from.tangent.along)?;
         Ok(orbit.value)
     }
 
-    fn sample(&self, guess: &Orbit, normal: &DVector<f64>) -> Result<Sample, OrbitError> {
+    pub(super) fn sample(&self, guess: &Orbit, normal: &DVector<f64>) -> Result<Sample, OrbitError> {
         let (orbit, tangent) = Orbit::correct(&self.map, guess, self.scale, normal)?;
+        self.with_multipliers(orbit, tangent)
+    }
+
+    pub(super) fn with_multipliers(&self, orbit: Orbit, tangent: Tangent) -> Result<Sample, OrbitError> {
         let place = self.place(&orbit);
         let all = self
             .map
@@ -262,89 +340,11 @@ impl<M: PeriodMap> Follower<M> {
         })
     }
 
-    /// Crossing of the unit circle by the multiplier that moves from one value to another over a step, with the length
-    /// of the step along the branch to it. Regula falsi with the weights of Anderson and Björck keeps the crossing
-    /// enclosed. `None` if an orbit in between fails or has no followed multiplier.
-    fn refine(&self, here: &Sample, step: f64, from: Complex64, to: Complex64) -> Option<(f64, Event)> {
-        let outward = to.norm() > 1.0;
-        let mut bracket = SignChange::new([0.0, from.norm() - 1.0], [step, to.norm() - 1.0]);
-        let mut roots = [from, to];
-        let mut sample = here.clone();
-        let mut root = from;
-        for _ in 0..60 {
-            let middle = bracket.next();
-            let [low, high] = bracket.ends();
-            let share = ((middle - low) / (high - low)).clamp(0.0, 1.0);
-            let expected = roots[0] + (roots[1] - roots[0]) * share;
-            sample = self.step(here, middle).ok()?;
-            root = nearest(&sample.roots, expected)?;
-            let excess = root.norm() - 1.0;
-            if excess.abs() < 1e-11 || bracket.width() < 1e-11 {
-                break;
-            }
-            roots[bracket.narrow(middle, excess)] = root;
-        }
-        let on_circle = root / root.norm();
-        let parameter = self.map.parameter();
-        let kind = StabilityLoss::of(root);
-        let event = Event {
-            value: self.place(&sample.orbit).value,
-            error: parameter.in_results(self.error(&sample, root).unwrap_or(self.scale.value)),
-            kind,
-            gain: !outward,
-            multiplier: on_circle,
-            orbit: sample.orbit.clone(),
-            chatter_hz: match kind {
-                // At a fold the orbit jumps to another one of the same period, so that no new frequency appears.
-                StabilityLoss::Fold => None,
-                _ => self.map.chatter_hz(&sample.orbit, on_circle),
-            },
-        };
-        Some((bracket.ends()[0], event))
-    }
-
-    /// Error of the parameter at a crossing: its change along the branch over which the multiplier moves by its error,
-    /// the larger one of both directions, plus [`ORBIT_ROOM`] times its change on a finer mesh.
-    /// `None` if it cannot be computed, or if the multiplier hardly moves along the branch.
-    fn error(&self, at: &Sample, root: Complex64) -> Option<f64> {
-        let order = self.map.problem().order();
-        let finer = Follower {
-            map: self.map.finer()?,
-            rpm: self.rpm,
-            scale: self.scale,
-            range: self.range,
-        };
-        // Normal of the hyperplane in which the orbit is corrected on the finer mesh. It contains only the states of
-        // the structure and the parameter, which both meshes have in common.
-        let mut normal = DVector::zeros(finer.map.size() + 1);
-        normal
-            .rows_mut(0, order)
-            .copy_from(&at.tangent.along.rows(0, order));
-        normal[finer.map.size()] = at.tangent.along[self.map.size()];
-        let length = normal.norm();
-        let there = finer
-            .sample(&at.orbit.onto(&self.map, &finer.map), &(normal / length))
-            .ok()?;
-        let change = (nearest(&there.roots, root)? - root).norm();
-        let error = (ORBIT_ROOM * change).max(LEAST_ERROR);
-        let beside = self.step(at, BRANCH_STEP_MIN).ok()?;
-        let slope = (nearest(&beside.roots, root)?.norm() - root.norm()).abs() / BRANCH_STEP_MIN;
-        let reach = error / slope;
-        if reach.is_nan() || reach > BRANCH_STEP_MAX {
-            return None;
-        }
-        let value = at.orbit.value;
-        let shift = |step: f64| Some((self.value(at, step).ok()? - value).abs());
-        let along = shift(reach)?.max(shift(-reach)?);
-        // At a fold the parameter is stationary along the branch, so that its change vanishes. At least [`LEAST_ERROR`]
-        // of the parameter is therefore stated.
-        Some(along.max(LEAST_ERROR * value) + ORBIT_ROOM * (there.orbit.value - value).abs())
-    }
-
     fn point(&self, sample: &Sample) -> BranchPoint {
         BranchPoint {
             value: self.place(&sample.orbit).value,
             amplitude_mm: self.map.problem().amplitude_mm(&sample.orbit.states),
+            displacement_mm: self.map.problem().displacement_mm(&sample.orbit.start),
             multiplier_abs: sample.largest,
             outside: sample.outside(),
         }

@@ -24,6 +24,13 @@ impl ForcedProblem {
         std::array::from_fn(|axis| 0.5e3 * (high[axis] - low[axis]))
     }
 
+    /// Displacement of the tool in a state, in feed, normal and axial direction, mm.
+    pub(super) fn displacement_mm(&self, state: &DVector<f64>) -> [f64; 3] {
+        let structure = &self.linear.structure;
+        let displacement = &structure.c * state.rows(0, structure.order());
+        std::array::from_fn(|axis| 1e3 * displacement[axis])
+    }
+
     /// Derivative of [`force_per_depth`](Self::force_per_depth) with respect to the feed per tooth, N/m².
     pub(super) fn force_per_depth_and_feed(&self, teeth: usize, phase: f64) -> Vector3<f64> {
         let process = &self.linear.process;

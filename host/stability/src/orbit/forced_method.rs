@@ -59,6 +59,7 @@ fn broke_down(rpm: f64, depth_mm: f64, cause: OrbitError) -> StabilityError {
         OrbitError::Singular { .. } => "the equations of the forced orbit are singular",
         OrbitError::Lost { .. } => "the forced orbit is lost in a fold before this depth",
         OrbitError::NotCovered { what } => what,
+        OrbitError::Journal { .. } => "the orbits cannot be recorded",
         OrbitError::Eigenvalues { cause, .. } => {
             return StabilityError::Eigenvalues { rpm, depth_mm, cause };
         }

@@ -9,10 +9,13 @@
 
 mod anderson;
 mod branch;
+mod branch_record;
 mod branches;
 mod choice;
 mod collocated;
 mod collocation_matrix;
+mod criticality;
+mod crossing;
 pub mod curve;
 mod equivalent;
 mod explicit;
@@ -24,6 +27,7 @@ mod pairing;
 mod parameter;
 mod periodic_orbit;
 mod restoring;
+mod resumed_branch;
 mod revolution_period;
 mod tooth_period;
 mod tooth_period_map;
@@ -36,8 +40,10 @@ mod follower_tests;
 mod revolution_period_tests;
 
 pub use branch::{Branch, BranchPoint, BrokenBranch, Event, Extent};
-pub use branches::{follow, follow_depth};
+pub use branch_record::{BranchJournal, BranchRecord, Unrecorded};
+pub use branches::{follow, follow_depth, follow_recorded};
 pub use choice::collocation_of;
+pub use criticality::{Criticality, criticality};
 pub use equivalent::EquivalentProblem;
 pub use forced::ForcedProblem;
 pub use parameter::{Parameter, Place, Setting};

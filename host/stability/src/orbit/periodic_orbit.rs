@@ -38,6 +38,12 @@ pub enum OrbitError {
         /// The feature, and what to do instead.
         what: &'static str,
     },
+    /// The orbits of a branch cannot be recorded, or the recorded ones are none of this branch.
+    #[error("the orbit at {place} cannot be recorded, or the recorded orbits are none of this branch")]
+    Journal {
+        /// Varied parameter and its value.
+        place: Place,
+    },
     /// The Floquet multipliers about a forced orbit cannot be computed.
     #[error("the Floquet multipliers about the orbit at {place} cannot be computed: {cause}")]
     Eigenvalues {
@@ -125,7 +131,7 @@ pub(super) struct Tangent {
     /// Unit tangent of the branch: changes of the orbit's start state and of the parameter, each divided by its [`Scale`].
     pub(super) along: DVector<f64>,
     /// Change of the states at the nodes of each subinterval per unit of length along the branch, n states × m nodes.
-    states: Vec<DMatrix<f64>>,
+    pub(super) states: Vec<DMatrix<f64>>,
 }
 
 /// Orbit one step before another one on a branch.
@@ -209,6 +215,16 @@ impl Orbit {
                 .map(|subinterval| DMatrix::zeros(order, subinterval.gauss.nodes.len()))
                 .collect(),
         }
+    }
+
+    /// True if an orbit has as many states as this one, on as many subintervals.
+    pub(super) fn has_form_of(&self, other: &Self) -> bool {
+        let shapes = self.states.iter().zip(&other.states);
+        self.start.len() == other.start.len()
+            && self.states.len() == other.states.len()
+            && shapes
+                .into_iter()
+                .all(|(own, other)| own.shape() == other.shape())
     }
 
     /// Interpolates the orbit from the nodes of one mesh to those of another.

@@ -9,7 +9,7 @@
 //! its derivatives. A periodic orbit is its fixed point: on it u = u_τ, and the previously cut surface does not act.
 //! Subintervals end where teeth enter and leave the cut.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::collocated::Linearized;
 use super::forced::ForcedProblem;
@@ -187,6 +187,20 @@ pub(super) fn jacobians(
 }
 
 impl ToothPeriod<'_> {
+    /// Regenerative matrix per axial depth at a node of a subinterval, B Σ_teeth s·cutting·nᵀ C.
+    pub(super) fn chip_per_depth(&self, subinterval: &Subinterval, node: usize) -> DMatrix<f64> {
+        let problem = self.problem;
+        let structure = &problem.linear.structure;
+        let process = &problem.linear.process;
+        let phase = subinterval.phase + subinterval.turn * self.gauss.nodes[node];
+        let mut directional = Matrix3::zeros();
+        for tooth in 0..subinterval.teeth {
+            let angle = process.engagement.angle(tooth, phase);
+            directional += process.force.directional(angle) * problem.chip_slope(angle);
+        }
+        &structure.b * directional * &structure.c
+    }
+
     /// Collocation of a subinterval, linearized about the states at its nodes.
     pub(super) fn linearized(
         &self,

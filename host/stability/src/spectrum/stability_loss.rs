@@ -1,10 +1,10 @@
 //! The ways in which a Floquet multiplier leaves the unit circle.
 
 use num_complex::Complex64;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// How a Floquet multiplier leaves the unit circle: the kind of bifurcation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum StabilityLoss {
     /// Complex pair (Neimark–Sacker, secondary Hopf, torus): chatter at a frequency independent of the tooth-passing
@@ -39,7 +39,7 @@ impl StabilityLoss {
     }
 
     /// Number of Floquet multipliers that cross the unit circle together: 2 for a complex pair, else 1.
-    pub(crate) fn count(self) -> i32 {
+    pub fn count(self) -> i32 {
         match self {
             Self::Hopf => 2,
             Self::Flip | Self::Fold => 1,

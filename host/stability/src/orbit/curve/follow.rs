@@ -270,8 +270,13 @@ impl<'a> CurveFollower<'a> {
             let unknowns = fits.then(|| DVector::from_vec(record.unknowns.clone()))?;
             let along = DVector::from_vec(record.along.clone());
             let phase = DVector::from_vec(record.phase.clone());
-            self.corrector
-                .correct(&self.system.of_unknowns(unknowns)?, &phase, &along)
+            let guess = self.system.of_unknowns(unknowns.clone())?;
+            let mut orbit = self.corrector.correct(&guess, &phase, &along)?;
+            // Only the node values are needed from the correction. It moves the unknowns within its tolerance, which
+            // the positions of all later orbits would show.
+            orbit.orbit.unknowns = unknowns;
+            orbit.along = along;
+            Some(orbit)
         };
         let Some((last, earlier)) = records.split_last() else {
             return Some((first.clone(), None, CURVE_STEP_FIRST));

@@ -10,7 +10,7 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{DMatrix, DVector, DVectorView, Matrix3};
+use nalgebra::{DMatrix, DVector, DVectorView};
 
 use super::super::explicit::Explicit;
 use super::super::forced::ForcedProblem;
@@ -168,25 +168,11 @@ impl AtModeNode<'_> {
         self.map.problem
     }
 
-    /// Regenerative matrix per axial depth, B Σ_teeth s·cutting·nᵀ C.
-    fn chip_per_depth(&self) -> DMatrix<f64> {
-        let (problem, subinterval) = (self.problem(), self.subinterval);
-        let structure = &problem.linear.structure;
-        let process = &problem.linear.process;
-        let phase = subinterval.phase + subinterval.turn * self.map.gauss.nodes[self.node];
-        let mut directional = Matrix3::zeros();
-        for tooth in 0..subinterval.teeth {
-            let angle = process.engagement.angle(tooth, phase);
-            directional += process.force.directional(angle) * problem.chip_slope(angle);
-        }
-        &structure.b * directional * &structure.c
-    }
-
     /// The mode equation at this node about a mode, with derivatives with respect to the parameters of `explicit`.
     pub(super) fn evaluate(&self, explicit: &Explicit<'_>, mode: DVectorView<'_, f64>) -> ModeNode {
         let (problem, layout) = (self.problem(), self.layout);
         let state = self.state.clone_owned();
-        let per_depth = self.chip_per_depth();
+        let per_depth = self.map.chip_per_depth(self.subinterval, self.node);
         let depth_m = problem.depth_at(&state, self.depth_m);
         let chip = &per_depth * depth_m;
         let regeneration = self.angle.regeneration();
