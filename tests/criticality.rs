@@ -14,7 +14,7 @@ fn rpm(tau: f64) -> f64 {
 }
 
 fn case(name: &str) -> Case {
-    Case::read(&cases().join(format!("{name}.toml"))).unwrap()
+    Case::read(cases().join(format!("{name}.toml"))).unwrap()
 }
 
 fn robot() -> Case {

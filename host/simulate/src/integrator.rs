@@ -491,7 +491,8 @@ impl<'a> Integrator<'a> {
 
 fn moving(model: &Model) -> Vec<Range<usize>> {
     let mut from = model.dynamics.order();
-    let mut moving = vec![0..from];
+    let mut moving = Vec::with_capacity(1 + model.restoring_forces.len());
+    moving.push(0..from);
     for restoring_force in &model.restoring_forces {
         let to = from + restoring_force.states();
         if !restoring_force.remembers() {

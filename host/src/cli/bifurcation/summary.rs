@@ -15,12 +15,17 @@ use crate::stability::StabilityLoss;
 pub(super) fn text(request: &Request, teeth: usize, computed: &Computed) -> String {
     let branch = &computed.branch;
     let mut text = format!(
-        "forced orbits over {} {}, {}: {} orbits, {} bifurcations",
+        "forced orbits over {} {}, {}: {} orbits, {} {}",
         request.vary.name(),
         range(request.vary, request.range),
         fixed(request),
         branch.points.len(),
-        branch.events.len()
+        branch.events.len(),
+        if branch.events.len() == 1 {
+            "bifurcation"
+        } else {
+            "bifurcations"
+        }
     );
     if !branch.events.is_empty() {
         // Writing to a String cannot fail.
