@@ -189,7 +189,9 @@ impl VerdictLog {
             chatter.to_s = next.t_s;
         }
         let is_new = self.verdicts.last().is_none_or(|last| {
-            last.verdict != next.verdict || last.alarm != next.alarm || !is_same_advice(last.advice.as_ref(), next.advice.as_ref())
+            last.verdict != next.verdict
+                || last.alarm != next.alarm
+                || !is_same_advice(last.advice.as_ref(), next.advice.as_ref())
         });
         if !is_new {
             return None;
@@ -302,7 +304,7 @@ mod tests {
         let report = report(1250, Verdict::PeriodDoubling, 0);
         assert_eq!(
             serde_json::to_string(&VerdictAnswer::new(&report)).unwrap(),
-            r#"{"t_s":1.25,"verdict":"period-doubling","chatter_hz":17.9,"confidence":0.98,"spindle_rpm":900.1,"advice":null}"#
+            r#"{"t_s":1.25,"verdict":"period-doubling","alarm":true,"chatter_hz":17.9,"confidence":0.98,"spindle_rpm":900.1,"advice":null}"#
         );
     }
 }
