@@ -165,7 +165,7 @@ fn solve(sums: &[f32; PRODUCTS]) -> Option<[f32; ORDER]> {
         for j in 0..=i {
             let sum = a[i][j] - (0..j).map(|k| a[i][k] * a[j][k]).sum::<f32>();
             if i == j {
-                if !(sum > 0.0) {
+                if sum.is_nan() || sum <= 0.0 {
                     return None;
                 }
                 a[i][i] = sqrt(sum);

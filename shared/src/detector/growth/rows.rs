@@ -44,11 +44,10 @@ mod tests {
         let passing: ToothPassing = core::array::from_fn(|n| ((n * 7919 % 23) as f32) - 11.0);
         let square = |values: &[f32]| values.iter().map(|x| x * x).sum::<f32>();
         assert!((square(&row(&passing)) / square(&passing) - 1.0).abs() < 1e-5);
-        for harmonic in 0..GROUPS {
+        for (harmonic, (from, to)) in ENDS.into_iter().enumerate() {
             let tone: ToothPassing =
                 core::array::from_fn(|n| crate::math::cos_turns((harmonic * (n / 3)) as f32 / SLOTS as f32));
             let row = row(&tone);
-            let (from, to) = ENDS[harmonic];
             assert!((square(&row[from..to]) / square(&tone) - 1.0).abs() < 1e-5);
         }
     }
