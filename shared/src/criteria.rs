@@ -115,6 +115,82 @@ pub(crate) const ANGLE_DEVIATION_MAX: f32 = 0.03;
 /// the computing time. Unfounded.
 pub(crate) const GROWTH_INTERVAL_SAMPLES: u32 = 53;
 
+// Growth of vibration, from tooth periods (`detector::growth`). "Campaign" is `shared/tests/detection`, seeds 1 to 60 and 5 000 000 to 5 000 179.
+
+/// Memory in tooth periods of the short window: growth of 1.5 per tooth period becomes 25-fold within it.
+pub(crate) const SHORT_MEMORY: f32 = 8.0;
+
+/// Memory in tooth periods of the long window: growth of 1.01 per tooth period becomes twofold within it.
+pub(crate) const LONG_MEMORY: f32 = 64.0;
+
+/// Least weight of the short window, Σ(7/8)^k, that is evaluated: five tooth periods for four coefficients and a constant that all channels share.
+/// From the campaign.
+pub(crate) const LEAST_WEIGHT: f32 = 3.5;
+
+/// |μ| up to which a cut counts as stable.
+pub(crate) const STABLE: f32 = 0.95;
+
+/// |μ| below which a vibration dies out for sure, so that its level may become usual. From the campaign.
+pub(crate) const SURELY_DECAYING: f32 = 0.98;
+
+/// Logarithm of the likelihood ratio above which the means of the classes are held. Unfounded.
+pub(crate) const SUSPICION: f32 = 8.0;
+
+/// Logarithm of the likelihood ratio, growth and amplitude together, above which growth is an alarm.
+///
+/// The growing coordinate of a pair is complex: its two quadratures double the statistic, which counts all innovations of a harmonic as one. 10
+/// stands for 20: a probability of 2·10⁻⁹ per independent window. Less than one false alarm in 100 h at 2000 tooth periods/s would need L = 38; the
+/// requirements beside it ([`LEAST_GROWTH`], [`LEAST_RECENT`], [`LEAST_ABS`], [`HOLD`]) have to make up for the rest. From the campaign.
+pub(crate) const GROWTH_LIKELIHOOD: f32 = 10.0;
+
+/// Least part of it that growth must give, and least growth in the short window: amplitude alone is also that of a hard spot. From the campaign.
+pub(crate) const LEAST_GROWTH: f32 = 3.0;
+/// See [`LEAST_GROWTH`].
+pub(crate) const LEAST_RECENT: f32 = 1.2;
+
+/// Most that the amplitude may give. An entry is a thousand times the power of air. Unfounded.
+pub(crate) const MOST_OF_AMPLITUDE: f32 = 32.0;
+
+/// Least |μ| of growth: a vibration that has saturated wanders about 1. From the campaign.
+pub(crate) const LEAST_ABS: f32 = 0.985;
+
+/// Least angle of a multiplier in turns. Nearer to the positive real axis lies the forced orbit while it moves: one turn in the 32 tooth periods of
+/// an entry.
+pub(crate) const LEAST_ANGLE: f32 = 0.03;
+
+/// Angle in turns within which a multiplier may be that of a class (a harmonic of the revolution): the resolution of half the long window.
+pub(crate) const CLASS_ANGLE: f32 = 0.03;
+
+/// Logarithm of the likelihood ratio against |μ| = 1 that growth at the angle of a class needs: a forced orbit that has moved stays there. From the
+/// campaign.
+pub(crate) const CLASS_UNITY: f32 = 0.5;
+
+/// Number of tooth periods for which growth must have been likely: a second evaluation. Without it entries raise five times as many alarms in the
+/// campaign.
+pub(crate) const HOLD: u32 = 1;
+/// The same at the angle of a class.
+pub(crate) const CLASS_HOLD: u32 = 3;
+
+/// Logarithm of the likelihood ratio against [`STABLE`] of a vibration that is called persistent, and its least |μ|: 65 tooth periods to fall to 1/e.
+/// Unfounded.
+pub(crate) const PERSISTENT_LIKELIHOOD: f32 = 20.0;
+/// See [`PERSISTENT_LIKELIHOOD`].
+pub(crate) const PERSISTENT_ABS: f32 = 0.985;
+
+/// Ratio of alternating to tooth-periodic vibration above which "flip or runout" is an alarm: G · runout/feed with an unknown runout of 50 µm and an
+/// unknown feed of 0.1 mm. G = 8, unfounded: the quantile of the stable cuts of the campaign is to be measured.
+pub(crate) const FLIP_ALARM: f32 = 8.0 * 0.05 / 0.1;
+
+/// Number of evaluations whose last is the first usual power. Unfounded.
+pub(crate) const USUAL_FIRST: u8 = 4;
+/// Gains per evaluation with which the usual power falls and rises. Growth of 1.01 whose |μ| is estimated too low for 100 tooth periods raises it
+/// by 1/3. From the campaign.
+pub(crate) const USUAL_FALLS: f32 = 0.125;
+/// See [`USUAL_FALLS`].
+pub(crate) const USUAL_RISES: f32 = 0.003;
+/// Largest relative rise per evaluation: one blow does not become usual.
+pub(crate) const USUAL_STEP: f32 = 0.125;
+
 // Thresholds of the verdict and of the advice, which follow each block of samples.
 
 /// Time constant, in blocks, of the running mean of the share of clipped or lost samples. Unfounded.

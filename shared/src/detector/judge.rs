@@ -9,6 +9,7 @@
 //! | [`Tone`] of a band | a new tone beside the harmonics, and its frequency |
 //! | [`Presence`] | whether anything is cut, against the quietest the machine has been |
 
+use crate::criteria::FLIP_ALARM;
 use crate::detector::evidence::{BANDS, Evidence};
 use crate::detector::finding::{Finding, Multiplier};
 use crate::detector::latched_chatter::{LatchedChatter, confidence};
@@ -38,8 +39,8 @@ pub struct Detector {
     held: Option<LatchedChatter>,
     /// Passings since the tool entered, as far as it is known.
     cut_passings: u32,
-    /// The alternating part was seen dying, or standing, since the tool entered.
-    runout_seen: bool,
+    /// What alternates may be a flip, and is too large for the runout of a tool.
+    is_large_flip: bool,
     judgement: Judgement,
     /// Time since the verdict changed, s.
     since_change_s: f32,
@@ -66,7 +67,7 @@ impl Detector {
             presence: [Presence::new(); BANDS],
             held: None,
             cut_passings: 0,
-            runout_seen: false,
+            is_large_flip: false,
             judgement: UNKNOWN,
             since_change_s: f32::INFINITY,
         }
@@ -77,6 +78,11 @@ impl Detector {
         &self.judgement
     }
 
+    /// True while chatter is held, or what may be a flip is too large for runout. It does not wait for the verdict, which holds for a second.
+    pub fn is_alarm(&self) -> bool {
+        self.held.is_some() || self.is_large_flip
+    }
+
     /// True while chatter is held: what is heard now is no background.
     pub fn is_chatter(&self) -> bool {
         self.held.is_some()
@@ -85,8 +91,8 @@ impl Detector {
     /// The signal was interrupted: only what the machine is like when it is quiet is still known.
     pub fn interrupt(&mut self) {
         self.held = None;
+        self.is_large_flip = false;
         self.cut_passings = 0;
-        self.runout_seen = false;
         self.judgement = UNKNOWN;
         self.since_change_s = f32::INFINITY;
     }
@@ -117,6 +123,7 @@ impl Detector {
         if air != Some(true) && !evidence.changing {
             self.catch(evidence);
         }
+        self.is_large_flip = false;
         let next = match &self.held {
             Some(held) => held.judgement(),
             None => self.judge(evidence, air),
@@ -163,7 +170,7 @@ impl Detector {
         for band in 0..BANDS {
             if let Some(finding) = evidence.findings[band]
                 && evidence.new_passings[band]
-                && finding.is_valid(evidence.teeth)
+                && (finding.growing.is_some() || finding.is_valid(evidence.teeth))
                 && let Some((multiplier, reason)) = self.chatter_in(band, finding, evidence)
             {
                 let newly = self
@@ -219,7 +226,6 @@ impl Detector {
             return judge_lines(evidence).unwrap_or(UNKNOWN);
         };
         if air {
-            self.runout_seen = false;
             return say(Verdict::AirCut, Reason::NoSignal, 0.9);
         }
         // The band in which more is going on speaks for both.
@@ -252,11 +258,6 @@ impl Detector {
             Some(_) => (Verdict::Indeterminate, Reason::Persistent, 0.0),
             None => (Verdict::Stable, Reason::Decaying, 0.8),
         };
-        if let Some((_, most)) = finding.alternating
-            && most < 1.0
-        {
-            self.runout_seen = true;
-        }
         let mut judgement = Judgement {
             verdict,
             reason,
@@ -271,9 +272,10 @@ impl Detector {
             && levels.runout > RUNOUT_OVER_RESIDUAL * levels.residual
         {
             let ambiguous = evidence.teeth.is_multiple_of(2) && levels.alternating > 0.5 * levels.runout;
-            if ambiguous && !self.runout_seen {
+            if ambiguous {
                 (judgement.verdict, judgement.reason) = (Verdict::Indeterminate, Reason::FlipOrRunout);
                 judgement.confidence = 0.0;
+                self.is_large_flip = levels.alternating > FLIP_ALARM * levels.forced;
             } else {
                 judgement.verdict = Verdict::Runout;
             }

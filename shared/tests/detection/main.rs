@@ -111,13 +111,14 @@ fn campaign() {
 const SLICE: std::ops::Range<u64> = 1..61;
 
 /// Share of the growing cuts whose alarm is in time; goal 0.95.
-const IN_TIME: f64 = 0.55;
+const IN_TIME: f64 = 0.72;
 /// Number of false onsets; goal 0.
-const FALSE_ONSETS: usize = 15;
+const FALSE_ONSETS: usize = 4;
 /// Share of the right kinds among the alarms in growing cuts; goal 0.98.
-const KINDS: f64 = 0.85;
+const KINDS: f64 = 0.92;
 
-/// The goal is an alarm in time in 95 % of the growing cuts, no false onset, and the right kind in 98 %. The bounds are what is reached.
+/// The goal is an alarm in time in 95 % of the growing cuts, no false onset, and the right kind in 98 %. The bounds are what is reached (18 of 22, 2, 19 of 19), less
+/// two sessions.
 #[test]
 fn slice_of_the_campaign() {
     println!("seeds {SLICE:?}");
