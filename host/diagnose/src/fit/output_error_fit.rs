@@ -69,16 +69,20 @@ impl OutputError<'_> {
         // The free decay of a linear baseline is that of the regression. That of another begins where the measured motion with its
         // noise has it, which is far where forces remember their path.
         let is_linear = self.study.baseline.terms.is_empty();
-        if self.is_free_decay && !is_linear {
-            point = self.near_to_far(&mut problem, point);
-        }
         // Candidate models fit the uncertain parameters with all their iterations: so does what they are compared with.
         let rounds = if self.study.uncertain.len() > 0 || !is_linear {
             ROUNDS
         } else {
             BASELINE_ROUNDS
         };
-        let found = self.search(&mut problem, &whole, point, rounds, f64::INFINITY)?;
+        let mut found = self.search(&mut problem, &whole, point.clone(), rounds, f64::INFINITY)?;
+        if self.is_free_decay && !is_linear {
+            let near = self.near_to_far(&mut problem, point);
+            let other = self.search(&mut problem, &whole, near, rounds, f64::INFINITY);
+            if let Some(other) = other.filter(|other| other.left < found.left) {
+                found = other;
+            }
+        }
         let slots: Vec<FreeParameter> = problem.slots.iter().map(|(slot, _)| *slot).collect();
         let extended = problem.extended(self.study, &found.point)?;
         Some((slots, found, extended))
