@@ -179,7 +179,7 @@ fn the_written_case_keeps_what_was_promised() {
         (Family::Sweep, 300),
         (Family::FreeDecay, 300),
         (Family::Shaker, 300),
-        (Family::CuttingInWorkshop, 0),
+        (Family::CuttingWithoutForce, 2),
         (Family::NothingInWorkshop, 6),
     ];
     let written: Vec<WrittenCase> = part
