@@ -29,6 +29,8 @@ const RUNOUT_SHARE: f32 = 1.0;
 const RUNOUT_OVER_RESIDUAL: f32 = 1.5;
 /// Time for which a verdict holds at least, s: a machinist reads it, and what changes faster is no state of the cut.
 const STEADY_S: f32 = 1.0;
+/// Confidence in a stable cut where nothing that could die or grow stands out. What dies leaves no less. A choice.
+const NOTHING_SEEN: f32 = 0.8;
 /// Passings until a cut is judged stable without anything that could be seen dying.
 const SETTLED: u32 = 24;
 
@@ -250,13 +252,13 @@ impl Detector {
         );
         let (verdict, reason, confidence) = match finding.multiplier {
             _ if !settled => (Verdict::Indeterminate, Reason::TooShort, 0.0),
-            Some(m) if finding.decaying || was_stable && m.abs < 1.0 => (
-                Verdict::Stable,
-                Reason::Decaying,
-                confidence(1.0 - m.abs, m.deviation),
-            ),
+            Some(m) if finding.decaying || was_stable && m.abs < 1.0 => {
+                let least = if finding.decaying { NOTHING_SEEN } else { 0.0 };
+                let confidence = confidence(1.0 - m.abs, m.deviation).max(least);
+                (Verdict::Stable, Reason::Decaying, confidence)
+            }
             Some(_) => (Verdict::Indeterminate, Reason::Persistent, 0.0),
-            None => (Verdict::Stable, Reason::Decaying, 0.8),
+            None => (Verdict::Stable, Reason::Decaying, NOTHING_SEEN),
         };
         let mut judgement = Judgement {
             verdict,
