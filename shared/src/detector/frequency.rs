@@ -1,9 +1,10 @@
 //! The frequency of chatter: which of all that look alike once per tooth period.
 
-use crate::detector::evidence::Evidence;
+use crate::detector::evidence::{BANDS, Evidence};
 use crate::detector::finding::{Finding, GrowthKind, Multiplier};
 use crate::math::round;
 use crate::spectrum::PowerSpectrum;
+use crate::synchronous::SLOTS;
 use crate::units::Hertz;
 
 /// A tone within so many bins of a frequency is at it.
@@ -11,17 +12,16 @@ const SAME_BINS: f32 = 1.5;
 /// Lines of a Hann window whose main lobes, four bins wide, stand apart.
 const RESOLVED_BINS: f32 = 4.0;
 
-/// (±arg μ/2π + k)/T, with k from the spectra, else from the shape within the tooth period.
+/// (±arg μ/2π + k)/T, with k from a tone of the spectrum that is new where one fits, else from the shape within the tooth period, else
+/// from the strongest line.
 ///
 /// The angle of the multiplier tells the frequency more sharply than the spectrum does; the spectrum only says which k carries the power.
-pub(super) fn frequency(multiplier: &Multiplier, finding: &Finding, evidence: &Evidence<'_>) -> Option<Hertz> {
-    let passing_hz = evidence.speed?.0 * f32::from(evidence.teeth);
-    by_spectra(multiplier, evidence).or(finding.cycles.map(|cycles| Hertz(cycles * passing_hz)))
-}
-
-/// The frequency by a tone that is new; before the background is learnt, by the strongest line. `None` where no line has the angle of
-/// the multiplier.
-pub(super) fn by_spectra(multiplier: &Multiplier, evidence: &Evidence<'_>) -> Option<Hertz> {
+pub(super) fn frequency(
+    multiplier: &Multiplier,
+    finding: &Finding,
+    band: usize,
+    evidence: &Evidence<'_>,
+) -> Option<Hertz> {
     let speed_hz = evidence.speed?.0;
     let passing_hz = speed_hz * f32::from(evidence.teeth);
     for (tone, spectrum) in evidence.tones.iter().zip(&evidence.spectra) {
@@ -33,11 +33,36 @@ pub(super) fn by_spectra(multiplier: &Multiplier, evidence: &Evidence<'_>) -> Op
             return Some(Hertz(frequency));
         }
     }
+    if let Some(cycles) = finding.cycles {
+        return Some(Hertz(passing_hz * unfolded(cycles, passing_hz, band, evidence)));
+    }
     let lines = evidence.spectra.iter().flatten();
     lines
         .filter_map(|spectrum| strongest(spectrum, multiplier, speed_hz, passing_hz))
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, frequency_hz)| Hertz(frequency_hz))
+}
+
+/// The cycles per tooth period with the most power in the spectrum of the tool band, of those that look alike at the slots.
+fn unfolded(cycles: f32, passing_hz: f32, band: usize, evidence: &Evidence<'_>) -> f32 {
+    let Some(spectrum) = evidence.spectra[band].filter(|_| band == BANDS - 1) else {
+        return cycles;
+    };
+    let highest = spectrum.power.len() as f32 * spectrum.bin.0 / passing_hz;
+    let slots = SLOTS as f32;
+    let power = |cycles: f32| spectrum.mean_square_near(Hertz(cycles * passing_hz));
+    let mut best = (cycles, power(cycles));
+    let mut turn = slots;
+    while turn - cycles < highest {
+        for candidate in [turn - cycles, turn + cycles] {
+            let power = power(candidate);
+            if candidate < highest && power > best.1 {
+                best = (candidate, power);
+            }
+        }
+        turn += slots;
+    }
+    best.0
 }
 
 /// Power, (m/s²)², and frequency, Hz, of the strongest line that looks like the multiplier once per tooth period, besides the harmonics of
@@ -89,7 +114,13 @@ mod tests {
         let mut power = [1e-3_f32; 513];
         // 8 kHz in 1 024 points, two teeth at 6 000 rev/min: chatter at 942 Hz, stronger teeth, and two images.
         let bin_hz = 8000.0 / 1024.0;
-        for (hz, line) in [(200.0, 90.0), (800.0, 70.0), (942.0, 9.0), (658.0, 2.0), (142.0, 1.0)] {
+        for (hz, line) in [
+            (200.0, 90.0),
+            (800.0, 70.0),
+            (942.0, 9.0),
+            (658.0, 2.0),
+            (142.0, 1.0),
+        ] {
             power[(hz / bin_hz + 0.5) as usize] = line;
         }
         let spectrum = PowerSpectrum {

@@ -2,7 +2,7 @@
 
 use crate::detector::evidence::Evidence;
 use crate::detector::finding::{Finding, GrowthKind, Multiplier};
-use crate::detector::frequency::{by_spectra, frequency};
+use crate::detector::frequency::frequency;
 use crate::detector::tone::Tone;
 use crate::detector::{Judgement, Reason, Verdict};
 use crate::synchronous::Levels;
@@ -62,7 +62,7 @@ impl LatchedChatter {
             band,
             by_tone: false,
             multiplier: Some(multiplier),
-            frequency: frequency(&multiplier, finding, evidence),
+            frequency: frequency(&multiplier, finding, band, evidence),
             largest: finding.level_of(multiplier.kind, evidence.teeth, evidence.floors[band]),
             since_growing: 0,
             below: 0,
@@ -180,7 +180,7 @@ impl LatchedChatter {
             if evidence.new_spectra.contains(&true)
                 && let Some(held) = self.multiplier
             {
-                self.frequency = by_spectra(&held, evidence).or(self.frequency);
+                self.frequency = frequency(&held, finding, self.band, evidence).or(self.frequency);
             }
             return;
         };
@@ -191,7 +191,7 @@ impl LatchedChatter {
             self.largest = finding.level_of(self.kind, evidence.teeth, evidence.floors[self.band]);
         }
         self.multiplier = Some(multiplier);
-        self.frequency = frequency(&multiplier, finding, evidence).or(self.frequency);
+        self.frequency = frequency(&multiplier, finding, self.band, evidence).or(self.frequency);
         if let Some(growing) = growing {
             self.since_growing = 0;
             self.confidence = confidence(growing.abs - 1.0, growing.deviation).max(self.confidence);
