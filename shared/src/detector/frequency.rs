@@ -9,11 +9,13 @@ use crate::units::Hertz;
 
 /// A tone within so many bins of a frequency is at it.
 const SAME_BINS: f32 = 1.5;
+/// A line with so many times the power at the frequency of the shape is the vibration, and the shape an image. A choice.
+const STRONGER: f32 = 10.0;
 /// Lines of a Hann window whose main lobes, four bins wide, stand apart.
 const RESOLVED_BINS: f32 = 4.0;
 
-/// (±arg μ/2π + k)/T, with k from a tone of the spectrum that is new where one fits, else from the shape within the tooth period, else
-/// from the strongest line.
+/// (±arg μ/2π + k)/T, with k from a tone of the spectrum that is new where one fits, else from the shape within the tooth period or a
+/// much stronger line.
 ///
 /// The angle of the multiplier tells the frequency more sharply than the spectrum does; the spectrum only says which k carries the power.
 pub(super) fn frequency(
@@ -33,14 +35,30 @@ pub(super) fn frequency(
             return Some(Hertz(frequency));
         }
     }
-    if let Some(cycles) = finding.cycles {
-        return Some(Hertz(passing_hz * unfolded(cycles, passing_hz, band, evidence)));
-    }
+    let by_shape = finding
+        .cycles
+        .map(|cycles| passing_hz * unfolded(cycles, passing_hz, band, evidence));
     let lines = evidence.spectra.iter().flatten();
-    lines
+    let line = lines
         .filter_map(|spectrum| strongest(spectrum, multiplier, speed_hz, passing_hz))
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, frequency_hz)| Hertz(frequency_hz))
+        .max_by(|a, b| a.0.total_cmp(&b.0));
+    // A band whose filter has left little of the vibration shows the shape of an image.
+    let frequency_hz = match (by_shape, line) {
+        (Some(shape_hz), Some((power, line_hz))) if power > STRONGER * power_near(shape_hz, evidence) => {
+            line_hz
+        }
+        (Some(shape_hz), _) => shape_hz,
+        (None, line) => line?.1,
+    };
+    Some(Hertz(frequency_hz))
+}
+
+/// Power at a frequency in the spectrum where it is largest, (m/s²)².
+fn power_near(hz: f32, evidence: &Evidence<'_>) -> f32 {
+    let spectra = evidence.spectra.iter().flatten();
+    spectra
+        .map(|spectrum| spectrum.mean_square_near(Hertz(hz)))
+        .fold(0.0, f32::max)
 }
 
 /// The cycles per tooth period with the most power in the spectrum of the tool band, of those that look alike at the slots.
