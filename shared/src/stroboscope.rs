@@ -1,17 +1,33 @@
-//! The last tooth passings: what happens once per tooth period.
+//! The stroboscopic map: the dominant multiplier μ over one tooth period.
 //!
 //! About the forced orbit a cut is linear with coefficients periodic in the tooth: a deviation seen once per tooth is a sum of
 //! c_r·μ_r^k, the same multipliers at every slot and axis. The cut is lost where the largest leaves the unit circle, through a complex
-//! pair (Hopf) or through −1 (flip). `detector::growth` estimates the multipliers; the shape of the deviation within the
-//! tooth period, which tells the frequency, comes from the passings kept here.
+//! pair (Hopf) or through −1 (flip). The forced vibration, runout included, is a constant of each class (tooth): an unknown offset of
+//! each channel and class, which is estimated *jointly* with the multipliers, so that runout, which alternates
+//! like a flip when the number of teeth is even, cannot pass for one: only growth can.
+//!
+//! Three estimators look at the last passings:
+//! - [`prediction`]: linear prediction with coefficients common to all channels, over several strides, for fast growth;
+//! - [`exponential`]: one complex pair fitted to a whole window, for slow growth that noise hides;
+//! - [`alternation`]: the growth of an alternating part, where an offset lies next to the multiplier −1.
 
-pub(crate) mod roots;
+pub mod alternation;
+pub mod exponential;
+pub mod prediction;
+mod roots;
 mod shape;
+
+#[cfg(test)]
+mod tests;
 
 use crate::synchronous::{CHANNELS, MAX_CLASSES, ToothPassing, clamp_classes};
 
+pub use alternation::Alternation;
+pub use exponential::{Exponential, Guess};
+pub use prediction::{Plan, Prediction};
+
 /// Passings remembered.
-pub const CAPACITY: usize = 32;
+pub const CAPACITY: usize = 64;
 
 /// The last passings, less those of the first revolution after the reset, so that rounding does not follow gravity and force.
 #[derive(Clone, Debug)]
@@ -132,5 +148,35 @@ impl Window<'_> {
         let start = usize::from(self.stroboscope.next) + 2 * CAPACITY - self.length;
         // The remainder is below the capacity.
         &self.stroboscope.passings[(start + row) % CAPACITY]
+    }
+
+    /// By how much what all classes have in common moved from the first half of the window to the second, as a root mean square over the
+    /// channels, in m/s². An orbit that does not change gives noise here, one that is still being entered does not.
+    pub fn drift(&self) -> f32 {
+        self.shift(self.length / 2 / self.classes() * self.classes())
+    }
+
+    /// The same from the turn before the last to the last: an orbit that is being left.
+    pub fn recent_drift(&self) -> f32 {
+        self.shift(self.classes())
+    }
+
+    /// Root mean square of the difference of the means of the last `count` rows and of the `count` before.
+    fn shift(&self, count: usize) -> f32 {
+        if count == 0 || 2 * count > self.length {
+            return 0.0;
+        }
+        let mut difference = [0.0; CHANNELS];
+        for row in 0..count {
+            let (old, new) = (
+                self.row(self.length - 1 - count - row),
+                self.row(self.length - 1 - row),
+            );
+            for ((sum, new), old) in difference.iter_mut().zip(new).zip(old) {
+                *sum += new - old;
+            }
+        }
+        let square: f32 = difference.iter().map(|d| d * d).sum();
+        crate::math::sqrt(square / CHANNELS as f32) / count as f32
     }
 }

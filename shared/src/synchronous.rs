@@ -311,17 +311,6 @@ impl Average {
         *count = (*count + 1).min(Self::MEMORY - 1);
     }
 
-    /// Deviation of a tooth period from the mean of its class; `None` before the first of the class.
-    pub fn deviation(&self, tooth: u64, passing: &ToothPassing) -> Option<ToothPassing> {
-        let class = (tooth % u64::from(self.classes)) as usize;
-        let (mean, count) = (self.means.get(class)?, self.counts.get(class)?);
-        let mut deviation = *passing;
-        for (value, mean) in deviation.iter_mut().zip(mean) {
-            *value -= mean;
-        }
-        (*count > 0).then_some(deviation)
-    }
-
     /// True once every class (tooth) has had at least two tooth periods.
     pub fn is_filled(&self) -> bool {
         self.counts

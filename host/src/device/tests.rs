@@ -115,7 +115,6 @@ fn report(sequence: u32) -> Report {
             multiplier_abs: None,
             confidence: 1.0,
         },
-        alarm: false,
         advice: None,
         clipped: 0,
         lost: 0,

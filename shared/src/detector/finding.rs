@@ -45,6 +45,8 @@ pub struct Finding {
     pub persistent: Option<Multiplier>,
     /// Cycles of what grows or persists per tooth period, from its shape within the period.
     pub cycles: Option<f32>,
+    /// Interval of confidence of |μ| of the alternating part, where one moves.
+    pub alternating: Option<(f32, f32)>,
 }
 
 impl Finding {
@@ -63,6 +65,7 @@ impl Finding {
         decaying: false,
         persistent: None,
         cycles: None,
+        alternating: None,
     };
 
     /// Two turns are needed before levels mean anything.

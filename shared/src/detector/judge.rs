@@ -9,7 +9,6 @@
 //! | [`Tone`] of a band | a new tone beside the harmonics, and its frequency |
 //! | [`Presence`] | whether anything is cut, against the quietest the machine has been |
 
-use crate::criteria::FLIP_ALARM;
 use crate::detector::evidence::{BANDS, Evidence};
 use crate::detector::finding::{Finding, Multiplier};
 use crate::detector::latched_chatter::{LatchedChatter, confidence};
@@ -29,8 +28,6 @@ const RUNOUT_SHARE: f32 = 1.0;
 const RUNOUT_OVER_RESIDUAL: f32 = 1.5;
 /// Time for which a verdict holds at least, s: a machinist reads it, and what changes faster is no state of the cut.
 const STEADY_S: f32 = 1.0;
-/// Confidence in a stable cut where nothing that could die or grow stands out. What dies leaves no less. A choice.
-const NOTHING_SEEN: f32 = 0.8;
 /// Passings until a cut is judged stable without anything that could be seen dying.
 const SETTLED: u32 = 24;
 
@@ -41,8 +38,8 @@ pub struct Detector {
     held: Option<LatchedChatter>,
     /// Passings since the tool entered, as far as it is known.
     cut_passings: u32,
-    /// What alternates may be a flip, and is too large for the runout of a tool.
-    is_large_flip: bool,
+    /// The alternating part was seen dying, or standing, since the tool entered.
+    runout_seen: bool,
     judgement: Judgement,
     /// Time since the verdict changed, s.
     since_change_s: f32,
@@ -69,7 +66,7 @@ impl Detector {
             presence: [Presence::new(); BANDS],
             held: None,
             cut_passings: 0,
-            is_large_flip: false,
+            runout_seen: false,
             judgement: UNKNOWN,
             since_change_s: f32::INFINITY,
         }
@@ -80,11 +77,6 @@ impl Detector {
         &self.judgement
     }
 
-    /// True while chatter is held, or what may be a flip is too large for runout. It does not wait for the verdict, which holds for a second.
-    pub fn is_alarm(&self) -> bool {
-        self.held.is_some() || self.is_large_flip
-    }
-
     /// True while chatter is held: what is heard now is no background.
     pub fn is_chatter(&self) -> bool {
         self.held.is_some()
@@ -93,8 +85,8 @@ impl Detector {
     /// The signal was interrupted: only what the machine is like when it is quiet is still known.
     pub fn interrupt(&mut self) {
         self.held = None;
-        self.is_large_flip = false;
         self.cut_passings = 0;
+        self.runout_seen = false;
         self.judgement = UNKNOWN;
         self.since_change_s = f32::INFINITY;
     }
@@ -125,7 +117,6 @@ impl Detector {
         if air != Some(true) && !evidence.changing {
             self.catch(evidence);
         }
-        self.is_large_flip = false;
         let next = match &self.held {
             Some(held) => held.judgement(),
             None => self.judge(evidence, air),
@@ -172,7 +163,7 @@ impl Detector {
         for band in 0..BANDS {
             if let Some(finding) = evidence.findings[band]
                 && evidence.new_passings[band]
-                && (finding.growing.is_some() || finding.is_valid(evidence.teeth))
+                && finding.is_valid(evidence.teeth)
                 && let Some((multiplier, reason)) = self.chatter_in(band, finding, evidence)
             {
                 let newly = self
@@ -228,6 +219,7 @@ impl Detector {
             return judge_lines(evidence).unwrap_or(UNKNOWN);
         };
         if air {
+            self.runout_seen = false;
             return say(Verdict::AirCut, Reason::NoSignal, 0.9);
         }
         // The band in which more is going on speaks for both.
@@ -252,14 +244,19 @@ impl Detector {
         );
         let (verdict, reason, confidence) = match finding.multiplier {
             _ if !settled => (Verdict::Indeterminate, Reason::TooShort, 0.0),
-            Some(m) if finding.decaying || was_stable && m.abs < 1.0 => {
-                let least = if finding.decaying { NOTHING_SEEN } else { 0.0 };
-                let confidence = confidence(1.0 - m.abs, m.deviation).max(least);
-                (Verdict::Stable, Reason::Decaying, confidence)
-            }
+            Some(m) if finding.decaying || was_stable && m.abs < 1.0 => (
+                Verdict::Stable,
+                Reason::Decaying,
+                confidence(1.0 - m.abs, m.deviation),
+            ),
             Some(_) => (Verdict::Indeterminate, Reason::Persistent, 0.0),
-            None => (Verdict::Stable, Reason::Decaying, NOTHING_SEEN),
+            None => (Verdict::Stable, Reason::Decaying, 0.8),
         };
+        if let Some((_, most)) = finding.alternating
+            && most < 1.0
+        {
+            self.runout_seen = true;
+        }
         let mut judgement = Judgement {
             verdict,
             reason,
@@ -274,10 +271,9 @@ impl Detector {
             && levels.runout > RUNOUT_OVER_RESIDUAL * levels.residual
         {
             let ambiguous = evidence.teeth.is_multiple_of(2) && levels.alternating > 0.5 * levels.runout;
-            if ambiguous {
+            if ambiguous && !self.runout_seen {
                 (judgement.verdict, judgement.reason) = (Verdict::Indeterminate, Reason::FlipOrRunout);
                 judgement.confidence = 0.0;
-                self.is_large_flip = levels.alternating > FLIP_ALARM * levels.forced;
             } else {
                 judgement.verdict = Verdict::Runout;
             }

@@ -18,9 +18,7 @@ const RELEASE_PASSINGS_LEAST: u8 = 2;
 /// Growth seen within so many passings or spectra is growth still.
 pub(super) const LAST_GROWTH: u8 = 16;
 /// An angle within this of the held one, in turns, is the same multiplier.
-const SAME_ANGLE: f32 = 0.05;
-/// A pair with a smaller angle than this, in turns, is no flip whose angle noise has moved.
-const CLEARLY_HOPF: f32 = 0.482;
+const SAME_ANGLE: f32 = 0.03;
 /// A tone within this part of the held frequency is the same, moved on.
 const SAME_TONE: f32 = 0.05;
 
@@ -173,28 +171,14 @@ impl LatchedChatter {
     fn follow_multiplier(&mut self, finding: &Finding, evidence: &Evidence<'_>) {
         let held = self.multiplier.map_or(0.0, |m| m.angle_turns);
         // Modes that grow and die beside it are not it.
-        let same = |m: &Multiplier| (m.angle_turns - held).abs() < SAME_ANGLE;
-        let growing = finding.growing.filter(same);
-        let Some(multiplier) = growing.or(finding.multiplier.filter(same)) else {
-            // Saturated, it has another multiplier, or none that stands out.
-            if evidence.new_spectra.contains(&true)
-                && let Some(held) = self.multiplier
-            {
-                self.frequency = frequency(&held, finding, self.band, evidence).or(self.frequency);
-            }
-            return;
-        };
-        // The first few passings do not tell a flip from a pair beside it.
-        let is_clear = multiplier.kind == GrowthKind::Flip || multiplier.angle_turns < CLEARLY_HOPF;
-        if multiplier.kind != self.kind && is_clear {
-            self.kind = multiplier.kind;
-            self.largest = finding.level_of(self.kind, evidence.teeth, evidence.floors[self.band]);
-        }
-        self.multiplier = Some(multiplier);
-        self.frequency = frequency(&multiplier, finding, self.band, evidence).or(self.frequency);
-        if let Some(growing) = growing {
+        let same = |m: &Multiplier| m.kind == self.kind && (m.angle_turns - held).abs() < SAME_ANGLE;
+        if let Some(growing) = finding.growing.filter(same) {
+            self.multiplier = Some(growing);
             self.since_growing = 0;
+            self.frequency = frequency(&growing, finding, self.band, evidence).or(self.frequency);
             self.confidence = confidence(growing.abs - 1.0, growing.deviation).max(self.confidence);
+        } else if let Some(multiplier) = finding.multiplier.filter(same) {
+            self.multiplier = Some(multiplier);
         }
     }
 

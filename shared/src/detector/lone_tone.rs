@@ -1,21 +1,24 @@
 //! Chatter as the spectrum alone tells it.
 
-use crate::decimation::TOOL_BAND;
 use crate::detector::Reason;
 use crate::detector::evidence::{BANDS, Evidence};
-use crate::detector::finding::GrowthKind;
+use crate::detector::finding::{Finding, GrowthKind};
 use crate::detector::latched_chatter::{LAST_GROWTH, LatchedChatter};
 use crate::detector::lines::LOUD;
 use crate::detector::tone::Tone;
 
+/// A residual of this part of the forced vibration that nothing explains is chatter, where a tone is in it.
+const WILD_SHARE: f32 = 1.0;
 /// A tone of less than this part of the power of its band is no chatter.
 const TONE_SHARE: f32 = 0.1;
+/// Passings after which a residual that nothing explains is no transient.
+const SETTLED: u32 = 24;
 
 /// Chatter as the spectrum tells it: where nothing can be sampled at fixed angles, or where that sees a residual that no few multipliers
 /// explain, as of a cut that is far over the limit.
 pub(super) fn tone_alone(evidence: &Evidence<'_>) -> Option<LatchedChatter> {
     evidence.speed?;
-    let unsampled = is_unsampled(evidence);
+    let unsampled = evidence.findings.iter().all(Option::is_none);
     for band in 0..BANDS {
         let lasting = evidence.lines[band]
             .filter(|_| unsampled)
@@ -26,7 +29,14 @@ pub(super) fn tone_alone(evidence: &Evidence<'_>) -> Option<LatchedChatter> {
         else {
             continue;
         };
-        let heard = unsampled && (tone.grows() || tone.lasts());
+        let heard = match evidence.findings[band] {
+            None => unsampled && (tone.grows() || tone.lasts()),
+            Some(finding) => {
+                tone.spectra >= 2
+                    && is_wild(finding, WILD_SHARE)
+                    && finding.levels.residual > 0.2 * tone.amplitude()
+            }
+        };
         if !heard {
             continue;
         }
@@ -53,14 +63,14 @@ pub(super) fn tone_alone(evidence: &Evidence<'_>) -> Option<LatchedChatter> {
     None
 }
 
-/// Whether nothing can be sampled at fixed angles: without a measured speed, or at more tooth passings than the band has samples for. A
-/// measured speed without passings otherwise is one that has just been found.
-fn is_unsampled(evidence: &Evidence<'_>) -> bool {
-    let is_nominal = evidence.lines.iter().any(Option::is_some);
-    let passings = evidence
-        .speed
-        .map_or(0.0, |speed| speed.0 * f32::from(evidence.teeth));
-    evidence.findings.iter().all(Option::is_none) && (is_nominal || passings > TOOL_BAND.0)
+/// Whether the passings have a residual of this part of the forced vibration that neither dies nor can be predicted.
+fn is_wild(finding: &Finding, share: f32) -> bool {
+    let residual = finding.levels.residual;
+    // The residual is a mean over some turns: the activity tells whether it is still there.
+    finding.passings >= SETTLED
+        && finding.multiplier.is_none()
+        && residual > share * finding.levels.forced
+        && finding.activity > residual
 }
 
 /// With an odd number of teeth the frequencies of a flip, odd multiples of half the tooth passing, are no harmonics of the spindle.

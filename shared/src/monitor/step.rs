@@ -60,7 +60,6 @@ impl Monitor {
             time,
             speed,
             judgement,
-            alarm: state.detector.is_alarm(),
             advice,
             clipped: state.sample_clock.clipped(),
             lost: state.sample_clock.lost(),

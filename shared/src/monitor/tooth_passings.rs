@@ -10,6 +10,7 @@ use crate::criteria::{
     ANGLE_DEVIATION_MAX, GROWTH_INTERVAL_SAMPLES, STRUCTURE_SAMPLES_PER_TOOTH, TOOL_SAMPLES_PER_TOOTH,
 };
 use crate::decimation::Sample;
+use crate::detector::growth::Evaluation;
 use crate::math;
 use crate::spectrum::{STRUCTURE_POINTS, TOOL_POINTS};
 use crate::synchronous::{Method, Passed, SLOTS, Sampler};
@@ -45,8 +46,15 @@ impl Monitor {
         };
         let rate = self.settings.sensor.nominal_rate.0 / self.decimation.tool_divisor() as f32;
         let noise = self.noise_density() * 0.5 * rate;
-        let evaluate = band.samples_since_growth >= GROWTH_INTERVAL_SAMPLES;
-        self.take_passing(band, &passed, noise, evaluate);
+        // Slow growth of the vibration is not evaluated in the tool band. The error of cubic interpolation leaves a
+        // residual of the forced vibration, which beats with the ratio of tooth period to sample period and would
+        // appear as slow growth.
+        let look = if band.samples_since_growth >= GROWTH_INTERVAL_SAMPLES {
+            Evaluation::Quick
+        } else {
+            Evaluation::None
+        };
+        self.take_passing(band, &passed, noise, look);
         // The points of the stroboscopic map come from the tool band only if the tooth period has too few samples of
         // the structure band.
         if !self.can_sample(
@@ -85,7 +93,7 @@ impl Monitor {
         let rate = self.settings.sensor.nominal_rate.0;
         let bandwidth = 0.5 * rate * SLOTS as f32 / angles.samples_per_tooth;
         let noise = self.noise_density() * bandwidth.min(0.5 * rate / divisor as f32);
-        self.take_passing(band, &passed, noise, true);
+        self.take_passing(band, &passed, noise, Evaluation::Close);
         show(
             &mut state.strobes,
             Band::Structure,
@@ -101,7 +109,7 @@ impl Monitor {
         band: &mut BandState<POINTS, BINS>,
         passed: &Passed,
         noise: f32,
-        evaluate: bool,
+        look: Evaluation,
     ) {
         band.floor = math::sqrt(noise);
         band.since_passing_s = 0.0;
@@ -112,8 +120,8 @@ impl Monitor {
             passing = band.growth.a_revolution_ago().unwrap_or(passing);
         }
         band.growth
-            .push(passed.tooth, &passing, noise, self.settings.tool.teeth, evaluate);
-        if evaluate {
+            .push(passed.tooth, &passing, noise, self.settings.tool.teeth, look);
+        if look >= Evaluation::Quick {
             // The detector gets a new finding only when the growth of the vibration was evaluated.
             band.passed = true;
             band.samples_since_growth = 0;

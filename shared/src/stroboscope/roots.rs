@@ -41,11 +41,28 @@ impl Complex {
 /// clusters are there after ten.
 const ITERATIONS: usize = 24;
 
-/// Roots of z^P − c\[0\]·z^(P−1) − … − c\[P−1\].
+/// Root of largest absolute value of z^P − c\[0\]·z^(P−1) − … − c\[P−1\]; of a complex pair the one with im > 0.
 ///
 /// Degree 2 in closed form; 3 and 4 by Durand and Kerner's iteration, which finds all roots at once. In single precision
 /// a simple root is good to about 1e-6 over its distance to the next. Returns `None` where an iteration left the finite numbers.
-pub(crate) fn all<const P: usize>(coefficients: &[f32; P]) -> Option<[Complex; P]> {
+pub(crate) fn largest<const P: usize>(coefficients: &[f32; P]) -> Option<Complex> {
+    let mut best: Option<Complex> = None;
+    for root in all(coefficients)? {
+        if best.is_none_or(|best| root.square() > best.square()) {
+            best = Some(root);
+        }
+    }
+    let best = best?;
+    // What rounding leaves of an imaginary part is none.
+    let im = if best.im * best.im < 1e-8 * best.square() {
+        0.0
+    } else {
+        best.im.abs()
+    };
+    (best.square().is_finite()).then_some(Complex::new(best.re, im))
+}
+
+fn all<const P: usize>(coefficients: &[f32; P]) -> Option<[Complex; P]> {
     let mut roots = [Complex::default(); P];
     match coefficients.as_slice() {
         [c] => roots[0] = Complex::new(*c, 0.0),
@@ -109,17 +126,6 @@ fn quadratic(c: f32, d: f32) -> (Complex, Complex) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// The root of largest absolute value; of a complex pair the one with im > 0.
-    fn largest<const P: usize>(coefficients: &[f32; P]) -> Option<Complex> {
-        let roots = all(coefficients)?;
-        let best = roots
-            .into_iter()
-            .max_by(|a, b| a.square().total_cmp(&b.square()))?;
-        // What rounding leaves of an imaginary part is none.
-        let is_real = best.im * best.im < 1e-8 * best.square();
-        Some(Complex::new(best.re, if is_real { 0.0 } else { best.im.abs() }))
-    }
 
     fn polynomial<const P: usize>(roots: [Complex; P]) -> [f32; P] {
         // Π (z − r), highest power first, without the leading 1.
