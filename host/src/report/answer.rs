@@ -17,6 +17,8 @@ pub struct VerdictAnswer {
     pub t_s: f64,
     /// Key of the verdict, see [`words::verdict_key`].
     pub verdict: &'static str,
+    /// True if the machine should be stopped or slowed: chatter.
+    pub alarm: bool,
     /// Chatter frequency, Hz; `None` without chatter.
     pub chatter_hz: Option<f64>,
     /// Probability that the verdict is correct, 0 to 1, as the device estimates it.
@@ -51,6 +53,7 @@ impl VerdictAnswer {
         Self {
             t_s: seconds(report),
             verdict: words::verdict_key(judgement.verdict),
+            alarm: judgement.verdict.is_chatter(),
             chatter_hz: judgement.chatter.map(|chatter| number(chatter.0)),
             confidence: number(judgement.confidence),
             spindle_rpm: report.speed.map(|speed| number(speed.0)),
@@ -297,7 +300,7 @@ mod tests {
         let report = report(1250, Verdict::PeriodDoubling, 0);
         assert_eq!(
             serde_json::to_string(&VerdictAnswer::new(&report)).unwrap(),
-            r#"{"t_s":1.25,"verdict":"period-doubling","chatter_hz":17.9,"confidence":0.98,"spindle_rpm":900.1,"advice":null}"#
+            r#"{"t_s":1.25,"verdict":"period-doubling","alarm":true,"chatter_hz":17.9,"confidence":0.98,"spindle_rpm":900.1,"advice":null}"#
         );
     }
 }
