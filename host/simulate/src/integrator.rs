@@ -41,7 +41,7 @@ pub(super) struct Integrator<'a> {
     workspace: Workspace,
     /// The regime of each restoring force, such as stick or slip, in the order of [`Model::restoring_forces`].
     regimes: Vec<Regime>,
-    /// Index ranges of the states that change within a step: all but the memories of restoring forces.
+    /// [`Model::moving`].
     moving: Vec<Range<usize>>,
     /// Start and end of the integration step that is evaluated, s, moved inwards by a rounding margin.
     within: [f64; 2],
@@ -84,7 +84,7 @@ impl<'a> Integrator<'a> {
             next_h: 0.0,
             statistics: Statistics::default(),
             regimes: vec![0; model.restoring_forces.len()],
-            moving: moving(model),
+            moving: model.moving(),
             workspace: Workspace::new(model),
             within: [0.0; 2],
         }
@@ -487,18 +487,4 @@ impl<'a> Integrator<'a> {
             displacement_mm: 1e3 * self.amplitude_m(),
         }
     }
-}
-
-fn moving(model: &Model) -> Vec<Range<usize>> {
-    let mut from = model.dynamics.order();
-    let mut moving = Vec::with_capacity(1 + model.restoring_forces.len());
-    moving.push(0..from);
-    for restoring_force in &model.restoring_forces {
-        let to = from + restoring_force.states();
-        if !restoring_force.remembers() {
-            moving.push(from..to);
-        }
-        from = to;
-    }
-    moving
 }

@@ -1,5 +1,7 @@
 //! Equation of motion of a structure with its cut, external excitation and restoring forces.
 
+use std::ops::Range;
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::contact::Contact;
@@ -36,6 +38,21 @@ impl Model {
     /// Number of states: those of [`Dynamics`], followed by the internal states of the restoring forces in their order.
     pub fn order(&self) -> usize {
         self.dynamics.order() + restoring_force::states(&self.restoring_forces)
+    }
+
+    /// Index ranges of the states that change within a step: all but the memories of restoring forces.
+    pub(super) fn moving(&self) -> Vec<Range<usize>> {
+        let mut from = self.dynamics.order();
+        let mut moving = Vec::with_capacity(1 + self.restoring_forces.len());
+        moving.push(0..from);
+        for restoring_force in &self.restoring_forces {
+            let to = from + restoring_force.states();
+            if !restoring_force.remembers() {
+                moving.push(from..to);
+            }
+            from = to;
+        }
+        moving
     }
 
     /// Force on the tool from cut and excitation, N, with process damping and the force drop of a shaker.
