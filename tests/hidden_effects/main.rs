@@ -178,8 +178,7 @@ fn the_written_case_keeps_what_was_promised() {
     let part = [
         (Family::Sweep, 300),
         (Family::FreeDecay, 300),
-        (Family::Shaker, 300),
-        (Family::CuttingWithoutForce, 2),
+        (Family::CuttingInWorkshop, 0),
         (Family::NothingInWorkshop, 6),
     ];
     let written: Vec<WrittenCase> = part
