@@ -20,7 +20,7 @@ const ONE_MARK_TOLERANCE: f32 = 0.1;
 const SPEED_CHANGE_PER_SECOND: f32 = 1.0;
 /// Part by which the mean square errors of prediction follow each error.
 const ERROR_FOLLOWS: f32 = 0.25;
-/// A ramp is believed where its mean square error is below this part of that of a line. A single late mark gives
+/// A ramp is taken where its mean square error is below this part of that of a line. A single late mark gives
 /// both the same error, and the ramp a larger one with the next edge.
 const RAMP_ERROR_SHARE: f32 = 0.5;
 /// An error of prediction counts up to this, in pitches: beyond it the edge is no evidence of a ramp.

@@ -27,7 +27,7 @@ pub fn allowed(abs: f64, tooth_period_s: f64) -> f64 {
     (6.0 + 1.5 * bound(abs)).max(0.02 / tooth_period_s)
 }
 
-/// What was heard of a session.
+/// Verdicts and alarms in a session.
 #[derive(Clone, Debug)]
 pub struct Heard {
     pub session: Session,
