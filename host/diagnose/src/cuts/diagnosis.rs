@@ -81,6 +81,11 @@ pub(crate) fn diagnosed(
     };
     watch(Stage::Answer);
     let mut diagnosis = answer(&explanations, &records, recordings);
+    if diagnosis.outcome == Outcome::Cause
+        && let Some(error) = unit_of_gain(&diagnosis.causes, recordings)
+    {
+        return Err(error);
+    }
     if let Some(extended) = diagnosis.extended(case) {
         match prediction_error_of(&extended, recordings) {
             Ok(error) => diagnosis.extended = error.or(diagnosis.extended),
@@ -88,11 +93,6 @@ pub(crate) fn diagnosed(
                 "the extended case cannot be compared with the records: {error}"
             )),
         }
-    }
-    if diagnosis.outcome == Outcome::Cause
-        && let Some(error) = unit_of_gain(&diagnosis.causes, recordings)
-    {
-        return Err(error);
     }
     Ok(Some(diagnosis))
 }
