@@ -5,6 +5,7 @@ use std::sync::Arc;
 use toml::Table;
 
 use crate::candidates::cause::Location;
+use quietcut_model::case::Case;
 use quietcut_model::effects::EffectName;
 
 /// Range of a coordinate.
@@ -31,6 +32,9 @@ impl Coordinate {
 /// Parameters of an effect, by key, at coordinates.
 pub(crate) type Parameters = Arc<dyn Fn(&[f64]) -> Vec<(&'static str, f64)> + Send + Sync>;
 
+/// Coordinates of an effect that changes nothing in a case.
+type Unchanged = Arc<dyn Fn(&Case) -> Option<Vec<f64>> + Send + Sync>;
+
 /// A form of an effect at a place, with coordinates that are standard normal before the records are seen.
 #[derive(Clone)]
 pub(crate) struct Candidate {
@@ -44,6 +48,8 @@ pub(crate) struct Candidate {
     /// True if the effect has an internal state that follows the motion: where it vanishes it has no orbit of its own.
     pub has_state: bool,
     parameters: Parameters,
+    /// Where the effect sets a parameter that the case has: its coordinates at the value of a case.
+    unchanged: Option<Unchanged>,
 }
 
 impl Candidate {
@@ -61,7 +67,17 @@ impl Candidate {
             vanishes: false,
             has_state: false,
             parameters: Arc::new(parameters),
+            unchanged: None,
         }
+    }
+
+    /// This candidate, which sets parameters that cases have: `unchanged` are its coordinates at the values of a case.
+    pub(crate) fn setting(
+        mut self,
+        unchanged: impl Fn(&Case) -> Option<Vec<f64>> + Send + Sync + 'static,
+    ) -> Self {
+        self.unchanged = Some(Arc::new(unchanged));
+        self
     }
 
     /// This candidate for each channel of its place by itself, as an answer lists it.
@@ -127,17 +143,17 @@ impl Candidate {
         Some(table)
     }
 
-    /// Coordinates at which the records are compared to first order.
-    pub(crate) fn starts(&self) -> Vec<Vec<f64>> {
-        let first = self
-            .coordinates
-            .iter()
-            .map(|coordinate| coordinate.start)
-            .collect();
-        if self.grid.is_empty() {
-            vec![first]
-        } else {
-            self.grid.clone()
+    /// Coordinates at which the records are compared to first order, for a baseline that has become `case`: an effect that sets a
+    /// parameter begins at the value that this has there.
+    pub(crate) fn starts(&self, case: &Case) -> Vec<Vec<f64>> {
+        if !self.grid.is_empty() {
+            return self.grid.clone();
         }
+        let unchanged = self.unchanged.as_ref().and_then(|unchanged| unchanged(case));
+        let first = || {
+            let starts = self.coordinates.iter().map(|coordinate| coordinate.start);
+            starts.collect()
+        };
+        vec![unchanged.unwrap_or_else(first)]
     }
 }

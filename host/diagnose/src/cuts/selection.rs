@@ -133,6 +133,9 @@ fn reduced<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut]
 /// All candidates are scored from the derivatives of `best`, and the first few are fitted.
 fn extended<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut]) -> Vec<Explanation<'a>> {
     let prior = priors(all);
+    let Some(case) = best.space.case(&best.fit.z) else {
+        return Vec::new();
+    };
     let starts = all
         .par_iter()
         .enumerate()
@@ -143,7 +146,12 @@ fn extended<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut
                 .iter()
                 .any(|known| is_same(known, candidate) || share_a_term(known, candidate))
         })
-        .flat_map_iter(|(index, candidate)| candidate.starts().into_iter().map(move |start| (index, start)));
+        .flat_map_iter(|(index, candidate)| {
+            candidate
+                .starts(&case)
+                .into_iter()
+                .map(move |start| (index, start))
+        });
     let mut scored: Vec<Scored> = starts
         .filter_map(|(index, start)| {
             let (gain, start) = score(best, &all[index], &start, records)?;
@@ -160,11 +168,33 @@ fn extended<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut
         }
         is_new
     });
+    for (place, scored) in scored.iter().enumerate() {
+        let candidate = &all[scored.index];
+        let Scored { gain, start, .. } = scored;
+        tracing::debug!(
+            place,
+            gain,
+            ?start,
+            "ranked: {} {}",
+            candidate.effect.name(),
+            candidate.location
+        );
+    }
     scored.truncate(FITTED);
     let fitted = |scored: Scored| {
-        let space = best.space.with(&all[scored.index]);
+        let candidate = &all[scored.index];
+        let space = best.space.with(candidate);
         let start: Vec<f64> = best.fit.z.iter().copied().chain(scored.start).collect();
-        let fitted = fit(&space, records, start, Some(&best.fit))?;
+        let fitted = fit(&space, records, start, Some(&best.fit));
+        tracing::debug!(
+            gain = fitted.as_ref().map(|fitted| prior_of(best) + fitted.evidence() + prior[scored.index] - best.evidence),
+            left = fitted.as_ref().map(|fitted| fitted.left / fitted.residual.len() as f64),
+            z = ?fitted.as_ref().map(|fitted| &fitted.z[best.fit.z.len()..]),
+            "fitted: {} {}",
+            candidate.effect.name(),
+            candidate.location
+        );
+        let fitted = fitted?;
         Some(Explanation {
             evidence: prior_of(best) + fitted.evidence() + prior[scored.index],
             space,
@@ -248,6 +278,8 @@ fn score(
     let mixed = best.fit.jacobian.tr_mul(&columns);
     let gradient = columns.tr_mul(&best.fit.residual)
         - mixed.tr_mul(&factor.solve(&(best.fit.jacobian.tr_mul(&best.fit.residual) - position(best))));
+    let start_z = DVector::from_column_slice(start);
+    let gradient = gradient - &start_z;
     let own = columns.tr_mul(&columns) - mixed.tr_mul(&factor.solve(&mixed));
     let information: DMatrix<f64> = own + DMatrix::identity(start.len(), start.len());
     let own_factor = Cholesky::new(information)?;
@@ -265,7 +297,7 @@ fn score(
         .zip(change.iter())
         .zip(&candidate.coordinates)
         .all(|((z, change), coordinate)| *z > coordinate.lower || *change == 0.0);
-    let gain = 0.5 * gradient.dot(&change) - determinant;
+    let gain = 0.5 * (gradient.dot(&change) - start_z.norm_squared()) - determinant;
     let z = if inside {
         z
     } else {
