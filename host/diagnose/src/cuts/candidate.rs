@@ -45,8 +45,6 @@ pub(crate) struct Candidate {
     pub grid: Vec<Vec<f64>>,
     /// True if the effect is absent where the first coordinate is zero.
     pub vanishes: bool,
-    /// True if the effect has an internal state that follows the motion: where it vanishes it has no orbit of its own.
-    pub has_state: bool,
     parameters: Parameters,
     /// Where the effect sets a parameter that the case has: its coordinates at the value of a case.
     unchanged: Option<Unchanged>,
@@ -65,7 +63,6 @@ impl Candidate {
             coordinates,
             grid: Vec::new(),
             vanishes: false,
-            has_state: false,
             parameters: Arc::new(parameters),
             unchanged: None,
         }
@@ -99,10 +96,10 @@ impl Candidate {
         self
     }
 
-    /// This candidate with an internal state.
-    pub(crate) fn with_state(mut self) -> Self {
-        self.has_state = true;
-        self
+    /// True if its first coordinate is the size of an effect whose shape the others tell, and is compared with the records where
+    /// the effect is faint: an internal state has no orbit without it, and shapes come from a grid.
+    pub(crate) fn is_faint_at_start(&self) -> bool {
+        self.vanishes && self.coordinates.len() > 1 && !self.grid.is_empty()
     }
 
     /// This candidate with further starts.

@@ -338,15 +338,14 @@ fn step(
             }
         }
         let change = Cholesky::new(matrix)?.solve(&right);
-        let mut beyond = false;
-        for index in 0..size {
-            let is_below = z[index] <= space.lower(index) && change[index] < 0.0;
-            if is_below && !held[index] {
-                held[index] = true;
-                beyond = true;
-            }
-        }
-        if beyond {
+        // One at a time: held at its bound, it may turn another back into the range.
+        let is_beyond =
+            |index: &usize| !held[*index] && z[*index] <= space.lower(*index) && change[*index] < 0.0;
+        let farthest = (0..size)
+            .filter(is_beyond)
+            .min_by(|a, b| change[*a].total_cmp(&change[*b]));
+        if let Some(index) = farthest {
+            held[index] = true;
             continue;
         }
         let moved: Vec<f64> = (0..size)
@@ -401,8 +400,12 @@ impl Fit {
         let mut columns = DMatrix::zeros(rows, coordinates.len());
         let mut row = 0;
         for (number, (state, record)) in self.states.iter().zip(records).enumerate() {
-            // Where an effect with an internal state is faint, only its size acts.
-            let count = if candidate.has_state { 1 } else { coordinates.len() };
+            // Where an effect is faint, only its size acts.
+            let count = if candidate.is_faint_at_start() {
+                1
+            } else {
+                coordinates.len()
+            };
             let mut own = DMatrix::zeros(record.errors.count(), coordinates.len());
             for index in 0..count {
                 let column = state.difference(&wider, &z, first + index, number, record)?;

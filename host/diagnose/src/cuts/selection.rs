@@ -154,9 +154,14 @@ fn extended<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut
         });
     let mut scored: Vec<Scored> = starts
         .filter_map(|(index, start)| {
-            let (gain, start) = score(best, &all[index], &start, records)?;
+            let (gain, end) = score(best, &all[index], &start, records)?;
             let gain = gain + prior[index];
-            (gain > 0.0).then_some(Scored { index, gain, start })
+            (gain > 0.0).then_some(Scored {
+                index,
+                gain,
+                at: start,
+                start: end,
+            })
         })
         .collect();
     scored.sort_by(|a, b| b.gain.total_cmp(&a.gain).then(a.index.cmp(&b.index)));
@@ -184,8 +189,18 @@ fn extended<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut
     let fitted = |scored: Scored| {
         let candidate = &all[scored.index];
         let space = best.space.with(candidate);
-        let start: Vec<f64> = best.fit.z.iter().copied().chain(scored.start).collect();
-        let fitted = fit(&space, records, start, Some(&best.fit));
+        // Where derivatives reach too far, there is no orbit near that of `best`: the start is then nearer.
+        let fitted = (0..NEARER_STARTS).find_map(|halvings| {
+            let share = 0.5_f64.powi(halvings);
+            let near = scored.at.iter().zip(&scored.start);
+            let start = near.map(|(at, start)| at + share * (start - at));
+            fit(
+                &space,
+                records,
+                best.fit.z.iter().copied().chain(start).collect(),
+                Some(&best.fit),
+            )
+        });
         tracing::debug!(
             gain = fitted.as_ref().map(|fitted| prior_of(best) + fitted.evidence() + prior[scored.index] - best.evidence),
             left = fitted.as_ref().map(|fitted| fitted.left / fitted.residual.len() as f64),
@@ -211,6 +226,8 @@ fn extended<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut
 struct Scored {
     index: usize,
     gain: f64,
+    /// Coordinates at which the derivatives are taken.
+    at: Vec<f64>,
     start: Vec<f64>,
 }
 
@@ -306,6 +323,8 @@ fn score(
     Some((if inside { gain } else { gain.min(0.0) - determinant }, z))
 }
 
+/// Number of starts of a fit, each half as far from where derivatives are taken as that before.
+const NEARER_STARTS: i32 = 5;
 /// Farthest start of a fit, in widths: a derivative at the baseline does not reach farther.
 const REACH: f64 = 2.0;
 
