@@ -8,7 +8,7 @@ use super::candidate::{Candidate, Coordinate};
 use super::fit::Fit;
 use super::record::ReducedCut;
 use super::restoring_candidates::{
-    Along, DAMPING_RATIO, of_axis, of_coupling, of_missing_mode, of_restoring_force,
+    Along, DAMPING_RATIO, FAINT, of_axis, of_coupling, of_missing_mode, of_restoring_force,
 };
 use crate::baseline::{Baseline, pickup_of};
 use crate::candidates::cause::Location;
@@ -29,6 +29,8 @@ const RUNOUT_UM: f64 = 10.0;
 /// Growth of the forces by wear, and change of the stiffness by heat and posture, over a record.
 const WEAR: f64 = 0.2;
 const DRIFT: f64 = 0.1;
+/// Friction coefficient of the flank of a tooth (dry steel and carbide: 0.2 to 0.5).
+const FLANK_FRICTION: f64 = 0.3;
 /// Error of the gain of a sensor.
 const GAIN: f64 = 0.1;
 /// Delay of a channel, in samples.
@@ -323,15 +325,21 @@ fn of_process_damping(baseline: &Baseline<'_>, records: &[ReducedCut], all: &mut
         .fold(f64::INFINITY, f64::min);
     let damping = 2.0 * DAMPING_RATIO * stiffest / (std::f64::consts::TAU * hertz);
     let width = damping * speed_per_depth;
-    let of = move |z: &[f64]| vec![("process_damping_n_per_m", width * z[0])];
+    let along_chip = move |z: &[f64]| vec![("process_damping_n_per_m", width * z[0])];
+    let with_friction = move |z: &[f64]| {
+        vec![
+            ("process_damping_n_per_m", width * z[0]),
+            ("friction", FLANK_FRICTION * z[1]),
+        ]
+    };
+    let (effect, place) = (EffectName::ProcessDamping, Location::Everywhere);
+    let coordinates = vec![Coordinate::POSITIVE];
+    all.push(Candidate::new(effect, place.clone(), coordinates, along_chip).vanishing_at_zero());
+    let coordinates = vec![Coordinate::POSITIVE; 2];
     all.push(
-        Candidate::new(
-            EffectName::ProcessDamping,
-            Location::Everywhere,
-            vec![Coordinate::POSITIVE],
-            of,
-        )
-        .vanishing_at_zero(),
+        Candidate::new(effect, place, coordinates, with_friction)
+            .vanishing_at_zero()
+            .started_at(vec![vec![FAINT, 1.0]]),
     );
 }
 

@@ -17,8 +17,8 @@ pub(super) const DAMPING_RATIO: f64 = 0.05;
 const COMPLIANCE: f64 = 0.3;
 /// Lowest coordinate of the yield of a hysteresis loop: at a twenty-seventh of the motion, where it is friction.
 const EARLIEST_YIELD: f64 = -2.0;
-/// Coordinate of an effect with an internal state at which it is compared with the records to first order.
-const FAINT: f64 = 0.01;
+/// Size of an effect with a shape at which it is compared with the records to first order.
+pub(super) const FAINT: f64 = 0.01;
 
 /// Sizes of the motion of the baseline along an axis.
 #[derive(Clone, Copy, Debug)]
