@@ -115,6 +115,22 @@ pub(crate) const ANGLE_DEVIATION_MAX: f32 = 0.03;
 /// the computing time. Unfounded.
 pub(crate) const GROWTH_INTERVAL_SAMPLES: u32 = 53;
 
+// A flip or runout (`detector::judge`).
+
+/// G: the ratio of alternating to tooth-periodic vibration in a stable cut with two teeth, for a runout as large as the feed per tooth. The 99.9 %
+/// quantile over drawn machines is 250, the largest value of the 614 cuts that `alternation_of_stable_cuts_with_runout` of
+/// `shared/tests/detection` made with 1000 seeds; the median is 4, the 99 % quantile 57.
+const ALTERNATION_OF_RUNOUT: f32 = 250.0;
+
+/// Runout that is assumed of a tool, in mm: a large one.
+const ASSUMED_RUNOUT_MM: f32 = 0.05;
+
+/// Feed per tooth that is assumed of a cut, in mm.
+const ASSUMED_FEED_MM: f32 = 0.1;
+
+/// Ratio of alternating to tooth-periodic vibration above which "flip or runout" is an alarm: G · runout/feed.
+pub(crate) const FLIP_ALARM: f32 = ALTERNATION_OF_RUNOUT * ASSUMED_RUNOUT_MM / ASSUMED_FEED_MM;
+
 // Thresholds of the verdict and of the advice, which follow each block of samples.
 
 /// Time constant, in blocks, of the running mean of the share of clipped or lost samples. Unfounded.

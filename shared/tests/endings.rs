@@ -4,7 +4,7 @@
 
 use quietcut_core::acceleration::{Block, Sensor};
 use quietcut_core::detector::{Judgement, Verdict};
-use quietcut_core::monitor::{Monitor, Settings, State};
+use quietcut_core::monitor::{Monitor, Report, Settings, State};
 use quietcut_core::tachometer::{Edge, Wheel};
 use quietcut_core::units::{Nanoseconds, Rpm};
 use quietcut_core::working_point::Tool;
@@ -31,6 +31,12 @@ const SAMPLES: usize = 64;
 impl Machine<'_> {
     /// The judgements with the times of their blocks, s.
     fn judgements(&self) -> Vec<(f64, Judgement)> {
+        let reports = self.reports().into_iter();
+        reports.map(|(time, report)| (time, report.judgement)).collect()
+    }
+
+    /// The reports with the times of their blocks, s.
+    fn reports(&self) -> Vec<(f64, Report)> {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         let sensor = Sensor::IIS3DWB_16G;
         let monitor = Monitor::new(Settings {
@@ -47,7 +53,7 @@ impl Machine<'_> {
         let noise = f64::from(sensor.noise_meters_per_second2_per_root_hertz) * (0.5 * rate).sqrt();
         let (mut angle, mut before) = (0.3, 0.3_f64);
         let mut edges = Vec::new();
-        let mut judgements = Vec::new();
+        let mut reports = Vec::new();
         let mut lost_before = false;
         for number in 0..(self.seconds * rate) as usize / SAMPLES {
             let start = (number * SAMPLES) as f64 / rate;
@@ -79,9 +85,9 @@ impl Machine<'_> {
             lost_before = false;
             let report = monitor.step(&mut state, &block, &edges, None, None);
             edges.clear();
-            judgements.push((start, report.judgement));
+            reports.push((start, report));
         }
-        judgements
+        reports
     }
 }
 
@@ -149,6 +155,41 @@ fn the_alarm_ends_after_an_emergency_stop() {
             assert!(first < 1.6 && last < 3.0 + stop_s + 1.0);
         }
     }
+}
+
+/// Two teeth that have little in common, 0.3 m/s², and differ by `alternating` m/s²; the spindle stops at 4 s.
+fn alternating_cut(alternating: f64) -> Vec<(f64, Report)> {
+    Machine {
+        teeth: 2,
+        wheel: ONE_MARK,
+        assumed_rpm: None,
+        speed: &|time| if time < 4.0 { 25.0 } else { 0.0 },
+        acceleration: &|time, angle| {
+            let turns = if time < 4.0 { 1.0 } else { 0.0 };
+            turns * (0.3 * forced(2.0, angle) + alternating * tone(1.0, angle + 0.07))
+        },
+        lost: &never,
+        seconds: 6.0,
+        seed: 9,
+    }
+    .reports()
+}
+
+#[test]
+fn what_may_be_a_flip_and_is_too_large_for_runout_is_an_alarm_until_the_spindle_stands() {
+    let alarms = |reports: &[(f64, Report)]| -> Vec<f64> {
+        let raised = reports.iter().filter(|(_, report)| report.alarm);
+        raised.map(|(time, _)| *time).collect()
+    };
+    let large = alternating_cut(60.0);
+    let raised = alarms(&large);
+    let (first, last) = (raised.first().unwrap(), raised.last().unwrap());
+    println!("from {first} to {last}");
+    assert!(*first < 3.0 && *last > 3.9 && *last < 5.0);
+    let (_, before_the_stop) = large.iter().rev().find(|(time, _)| *time < 3.9).unwrap();
+    assert_eq!(before_the_stop.judgement.verdict, Verdict::Indeterminate);
+    // As much as a runout of 50 µm may make at 0.1 mm per tooth.
+    assert!(alarms(&alternating_cut(20.0)).is_empty());
 }
 
 #[test]
@@ -272,6 +313,41 @@ fn verdicts_change_at_most_once_a_second() {
         println!("seed {seed}: {changes:?}");
         assert!(changes.windows(2).all(|pair| pair[1] - pair[0] > 0.99));
     }
+}
+
+/// Twelve teeth at 30 000 rev/min pass 6000 times a second: the tool band is sampled at fixed angles up to 5333.
+fn beyond_the_sampled_tooth_rate(acceleration: &dyn Fn(f64, f64) -> f64) -> Vec<(f64, Judgement)> {
+    Machine {
+        teeth: 12,
+        wheel: ONE_MARK,
+        assumed_rpm: None,
+        speed: &|_| 500.0,
+        acceleration,
+        lost: &never,
+        seconds: 4.0,
+        seed: 11,
+    }
+    .judgements()
+}
+
+#[test]
+fn a_new_tone_is_chatter_beyond_the_sampled_tooth_rate_and_a_quiet_cut_is_none() {
+    let quiet = |time: f64, angle: f64| {
+        let cut = if time > 0.7 { 1.0 } else { 0.05 };
+        cut * 5.0 * forced(1.0, angle)
+    };
+    let chatter = beyond_the_sampled_tooth_rate(&|time, angle| {
+        quiet(time, angle) + 40.0 * onset(time) * tone(1234.0, time)
+    });
+    let (first, last) = alarms(&chatter).unwrap();
+    println!("from {first} to {last}");
+    assert!(first > 1.0 && first < 1.6 && last > 3.9);
+    let (_, judgement) = chatter.last().unwrap();
+    assert!(
+        (judgement.chatter.unwrap().0 - 1234.0).abs() < 7.0,
+        "{judgement:?}"
+    );
+    assert_eq!(alarms(&beyond_the_sampled_tooth_rate(&quiet)), None);
 }
 
 /// A cut without tachometer at 3000 rev/min with four teeth, recorded from its middle on.

@@ -115,6 +115,7 @@ fn report(sequence: u32) -> Report {
             multiplier_abs: None,
             confidence: 1.0,
         },
+        alarm: false,
         advice: None,
         clipped: 0,
         lost: 0,

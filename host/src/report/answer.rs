@@ -17,7 +17,8 @@ pub struct VerdictAnswer {
     pub t_s: f64,
     /// Key of the verdict, see [`words::verdict_key`].
     pub verdict: &'static str,
-    /// True if the machine should be stopped or slowed: chatter.
+    /// True if the machine should be stopped or slowed: chatter, or "flip or runout" that is too large for runout. A device with version 1 of the
+    /// protocol tells the former only.
     pub alarm: bool,
     /// Chatter frequency, Hz; `None` without chatter.
     pub chatter_hz: Option<f64>,
@@ -53,7 +54,7 @@ impl VerdictAnswer {
         Self {
             t_s: seconds(report),
             verdict: words::verdict_key(judgement.verdict),
-            alarm: judgement.verdict.is_chatter(),
+            alarm: report.alarm || judgement.verdict.is_chatter(),
             chatter_hz: judgement.chatter.map(|chatter| number(chatter.0)),
             confidence: number(judgement.confidence),
             spindle_rpm: report.speed.map(|speed| number(speed.0)),
@@ -188,7 +189,9 @@ impl VerdictLog {
             chatter.to_s = next.t_s;
         }
         let is_new = self.verdicts.last().is_none_or(|last| {
-            last.verdict != next.verdict || !is_same_advice(last.advice.as_ref(), next.advice.as_ref())
+            last.verdict != next.verdict
+                || last.alarm != next.alarm
+                || !is_same_advice(last.advice.as_ref(), next.advice.as_ref())
         });
         if !is_new {
             return None;
@@ -236,6 +239,7 @@ mod tests {
                 multiplier_abs: None,
                 confidence: 0.98,
             },
+            alarm: false,
             advice: None,
             clipped: 3,
             lost,

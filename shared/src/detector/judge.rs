@@ -9,11 +9,12 @@
 //! | [`Tone`] of a band | a new tone beside the harmonics, and its frequency |
 //! | [`Presence`] | whether anything is cut, against the quietest the machine has been |
 
+use crate::criteria::FLIP_ALARM;
 use crate::detector::evidence::{BANDS, Evidence};
 use crate::detector::finding::{Finding, Multiplier};
 use crate::detector::latched_chatter::{LatchedChatter, confidence};
 use crate::detector::lines::LOUD;
-use crate::detector::lone_tone::tone_alone;
+use crate::detector::lone_tone::{is_unsampled, tone_alone};
 use crate::detector::presence::Presence;
 use crate::detector::tone::Tone;
 use crate::detector::{Judgement, Reason, Verdict};
@@ -28,6 +29,8 @@ const RUNOUT_SHARE: f32 = 1.0;
 const RUNOUT_OVER_RESIDUAL: f32 = 1.5;
 /// Time for which a verdict holds at least, s: a machinist reads it, and what changes faster is no state of the cut.
 const STEADY_S: f32 = 1.0;
+/// Confidence in a stable cut where nothing that could die or grow stands out. What surely dies out leaves no less. A choice.
+const NOTHING_SEEN: f32 = 0.8;
 /// Passings until a cut is judged stable without anything that could be seen dying.
 const SETTLED: u32 = 24;
 
@@ -40,6 +43,10 @@ pub struct Detector {
     cut_passings: u32,
     /// The alternating part was seen dying, or standing, since the tool entered.
     runout_seen: bool,
+    /// What alternates may be a flip, and is too large for the runout of a tool.
+    is_large_flip: bool,
+    /// Time without tooth periods at a known speed, s.
+    unsampled_s: f32,
     judgement: Judgement,
     /// Time since the verdict changed, s.
     since_change_s: f32,
@@ -67,6 +74,8 @@ impl Detector {
             held: None,
             cut_passings: 0,
             runout_seen: false,
+            is_large_flip: false,
+            unsampled_s: 0.0,
             judgement: UNKNOWN,
             since_change_s: f32::INFINITY,
         }
@@ -75,6 +84,11 @@ impl Detector {
     /// The newest judgement.
     pub fn judgement(&self) -> &Judgement {
         &self.judgement
+    }
+
+    /// True while chatter is held, or what may be a flip is too large for runout. It does not wait for the verdict, which holds for a second.
+    pub fn is_alarm(&self) -> bool {
+        self.held.is_some() || self.is_large_flip
     }
 
     /// True while chatter is held: what is heard now is no background.
@@ -87,6 +101,7 @@ impl Detector {
         self.held = None;
         self.cut_passings = 0;
         self.runout_seen = false;
+        (self.is_large_flip, self.unsampled_s) = (false, 0.0);
         self.judgement = UNKNOWN;
         self.since_change_s = f32::INFINITY;
     }
@@ -114,9 +129,15 @@ impl Detector {
         {
             self.held = None;
         }
+        self.unsampled_s = if evidence.speed.is_some() && is_unsampled(evidence) {
+            self.unsampled_s + evidence.seconds
+        } else {
+            0.0
+        };
         if air != Some(true) && !evidence.changing {
             self.catch(evidence);
         }
+        self.is_large_flip = false;
         let next = match &self.held {
             Some(held) => held.judgement(),
             None => self.judge(evidence, air),
@@ -175,7 +196,7 @@ impl Detector {
             }
         }
         if self.held.is_none() {
-            self.held = tone_alone(evidence);
+            self.held = tone_alone(evidence, self.unsampled_s);
         }
     }
 
@@ -244,13 +265,13 @@ impl Detector {
         );
         let (verdict, reason, confidence) = match finding.multiplier {
             _ if !settled => (Verdict::Indeterminate, Reason::TooShort, 0.0),
-            Some(m) if finding.decaying || was_stable && m.abs < 1.0 => (
-                Verdict::Stable,
-                Reason::Decaying,
-                confidence(1.0 - m.abs, m.deviation),
-            ),
+            Some(m) if finding.decaying || was_stable && m.abs < 1.0 => {
+                let least = if finding.decaying { NOTHING_SEEN } else { 0.0 };
+                let confidence = confidence(1.0 - m.abs, m.deviation).max(least);
+                (Verdict::Stable, Reason::Decaying, confidence)
+            }
             Some(_) => (Verdict::Indeterminate, Reason::Persistent, 0.0),
-            None => (Verdict::Stable, Reason::Decaying, 0.8),
+            None => (Verdict::Stable, Reason::Decaying, NOTHING_SEEN),
         };
         if let Some((_, most)) = finding.alternating
             && most < 1.0
@@ -274,6 +295,7 @@ impl Detector {
             if ambiguous && !self.runout_seen {
                 (judgement.verdict, judgement.reason) = (Verdict::Indeterminate, Reason::FlipOrRunout);
                 judgement.confidence = 0.0;
+                self.is_large_flip = levels.alternating > FLIP_ALARM * levels.forced;
             } else {
                 judgement.verdict = Verdict::Runout;
             }

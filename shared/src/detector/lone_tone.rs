@@ -2,23 +2,29 @@
 
 use crate::detector::Reason;
 use crate::detector::evidence::{BANDS, Evidence};
-use crate::detector::finding::{Finding, GrowthKind};
+use crate::detector::finding::GrowthKind;
 use crate::detector::latched_chatter::{LAST_GROWTH, LatchedChatter};
 use crate::detector::lines::LOUD;
 use crate::detector::tone::Tone;
 
-/// A residual of this part of the forced vibration that nothing explains is chatter, where a tone is in it.
-const WILD_SHARE: f32 = 1.0;
 /// A tone of less than this part of the power of its band is no chatter.
 const TONE_SHARE: f32 = 0.1;
-/// Passings after which a residual that nothing explains is no transient.
-const SETTLED: u32 = 24;
+/// Time without tooth periods at a known speed after which tones alone tell, s, and the least number of revolutions. A tachometer that has just
+/// locked gives tooth periods within two revolutions, and while the speed was not known any line was new. A choice.
+const UNSAMPLED_S: f32 = 1.0;
+/// See [`UNSAMPLED_S`].
+const UNSAMPLED_REVOLUTIONS: f32 = 3.0;
 
-/// Chatter as the spectrum tells it: where nothing can be sampled at fixed angles, or where that sees a residual that no few multipliers
-/// explain, as of a cut that is far over the limit.
-pub(super) fn tone_alone(evidence: &Evidence<'_>) -> Option<LatchedChatter> {
-    evidence.speed?;
-    let unsampled = evidence.findings.iter().all(Option::is_none);
+/// Chatter as the spectrum tells it, where nothing can be sampled at fixed angles: with a nominal speed, or with a measured one for
+/// `unsampled_s` already, as at more tooth periods than the band has samples for.
+///
+/// Beside tooth periods tones are no evidence: a tone that is new is also that of another force (an entry, a hard spot) on a structure that
+/// rings. In 210 sessions of the campaign of detection they raised 39 of 44 false alarms, and one of 81 growing cuts was heard in time by them alone.
+pub(super) fn tone_alone(evidence: &Evidence<'_>, unsampled_s: f32) -> Option<LatchedChatter> {
+    let speed = evidence.speed?;
+    let is_nominal = evidence.lines.iter().any(Option::is_some);
+    let is_lasting = unsampled_s >= UNSAMPLED_S.max(UNSAMPLED_REVOLUTIONS / speed.0);
+    let unsampled = is_unsampled(evidence) && (is_nominal || is_lasting);
     for band in 0..BANDS {
         let lasting = evidence.lines[band]
             .filter(|_| unsampled)
@@ -29,14 +35,7 @@ pub(super) fn tone_alone(evidence: &Evidence<'_>) -> Option<LatchedChatter> {
         else {
             continue;
         };
-        let heard = match evidence.findings[band] {
-            None => unsampled && (tone.grows() || tone.lasts()),
-            Some(finding) => {
-                tone.spectra >= 2
-                    && is_wild(finding, WILD_SHARE)
-                    && finding.levels.residual > 0.2 * tone.amplitude()
-            }
-        };
+        let heard = unsampled && (tone.grows() || tone.lasts());
         if !heard {
             continue;
         }
@@ -63,14 +62,9 @@ pub(super) fn tone_alone(evidence: &Evidence<'_>) -> Option<LatchedChatter> {
     None
 }
 
-/// Whether the passings have a residual of this part of the forced vibration that neither dies nor can be predicted.
-fn is_wild(finding: &Finding, share: f32) -> bool {
-    let residual = finding.levels.residual;
-    // The residual is a mean over some turns: the activity tells whether it is still there.
-    finding.passings >= SETTLED
-        && finding.multiplier.is_none()
-        && residual > share * finding.levels.forced
-        && finding.activity > residual
+/// True where no band is sampled at fixed angles.
+pub(super) fn is_unsampled(evidence: &Evidence<'_>) -> bool {
+    evidence.findings.iter().all(Option::is_none)
 }
 
 /// With an odd number of teeth the frequencies of a flip, odd multiples of half the tooth passing, are no harmonics of the spindle.

@@ -18,6 +18,10 @@ pub struct Report {
     pub speed: Option<Rpm>,
     /// The verdict on the cut with its reason and estimates.
     pub judgement: Judgement,
+    /// True while the machine should be stopped or slowed: chatter, or what may be a flip and is too large for the runout of the tool. Version 1
+    /// of the protocol does not carry it: in a report from a device it is false.
+    #[serde(skip)]
+    pub alarm: bool,
     /// The advice on speed and depth; `None` if the spindle speed is unknown.
     pub advice: Option<Advice>,
     /// Number of clipped acceleration samples since the signal chain was started or reset.

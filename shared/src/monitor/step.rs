@@ -60,6 +60,7 @@ impl Monitor {
             time,
             speed,
             judgement,
+            alarm: state.detector.is_alarm(),
             advice,
             clipped: state.sample_clock.clipped(),
             lost: state.sample_clock.lost(),

@@ -33,7 +33,7 @@ const MAX_PRODUCTS: usize = (MAX_ORDER + 1) * (MAX_ORDER + 2) / 2;
 pub struct Plan {
     /// Passings to look at, at most [`CAPACITY`].
     pub window: usize,
-    /// Number of multipliers, 1 to [`MAX_ORDER`].
+    /// Number of multipliers, 2 to [`MAX_ORDER`].
     pub order: usize,
     /// Tooth periods per step.
     pub stride: usize,
@@ -63,7 +63,6 @@ impl Window<'_> {
     /// Returns `None` where the window is too short for the plan, or the noise explains all there is.
     pub fn predict(&self, plan: Plan, noise: f32) -> Option<Prediction> {
         match plan.order {
-            1 => self.fit::<1>(plan, noise),
             2 => self.fit::<2>(plan, noise),
             3 => self.fit::<3>(plan, noise),
             MAX_ORDER => self.fit::<MAX_ORDER>(plan, noise),

@@ -9,6 +9,7 @@ use quietcut_core::working_point::Tool;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
+use super::literature::{self, Literature};
 use super::sensors::Sensors;
 use super::session::{Phase, STABLE, Session};
 
@@ -50,15 +51,35 @@ pub struct Heard {
     pub changes: usize,
     /// Largest number of them within a second.
     pub most_changes: usize,
+    /// For each detector of the literature and each of its thresholds: false onsets, and the first alarm after growth began, s.
+    pub literature: [[(usize, Option<f64>); FACTORS.len()]; literature::NAMES.len()],
 }
+
+/// Thresholds of the detectors of the literature, as factors over their calibration.
+pub const FACTORS: [f64; 4] = [1.5, 3.0, 6.0, 12.0];
 
 impl Heard {
     /// Delay of the alarm in passings; infinite where it is missing. `None` where nothing is to be heard.
     pub fn delay(&self) -> Option<f64> {
+        self.delay_of(self.alarm_s)
+    }
+
+    /// Delay of an alarm at this time, as [`delay`](Self::delay).
+    pub fn delay_of(&self, alarm_s: Option<f64>) -> Option<f64> {
         let clock = self.clock_s?;
-        Some(self.alarm_s.map_or(f64::INFINITY, |alarm| {
+        Some(alarm_s.map_or(f64::INFINITY, |alarm| {
             ((alarm - clock) / self.session.machine.tooth_period_s()).max(0.0)
         }))
+    }
+
+    /// Relative error of the chatter frequency that was said; infinite where none was. `None` without an alarm that was due.
+    pub fn frequency_error(&self) -> Option<f64> {
+        let hz = self.session.floquet.as_ref()?.frequency_hz;
+        self.alarm_s.and(self.clock_s)?;
+        Some(
+            self.frequency_hz
+                .map_or(f64::INFINITY, |said| (said / hz - 1.0).abs()),
+        )
     }
 
     pub fn multiplier_abs(&self) -> f64 {
@@ -84,14 +105,20 @@ pub fn listen(session: &Session) -> Heard {
     .unwrap();
     let mut state = Box::new(State::new());
     let mut log = Log::new(session);
+    let mut literature = Literature::new();
     while let Some(sensed) = sensors.block() {
         let report = monitor.step(&mut state, &sensed.block, &sensed.edges, None, None);
         log.take(&sensed, report.judgement);
+        literature.take(&sensed);
         if log.growth_is_over(sensed.time_s) {
             sensors.motion.end_phase(sensed.time_s);
         }
     }
-    log.end()
+    let mut heard = log.end();
+    heard.literature = std::array::from_fn(|detector| {
+        FACTORS.map(|factor| literature::alarms(&literature.statistics, detector, factor))
+    });
+    heard
 }
 
 /// Notes the verdicts block by block.
@@ -125,6 +152,7 @@ impl<'a> Log<'a> {
                 alarm_end_s: None,
                 changes: 0,
                 most_changes: 0,
+                literature: Default::default(),
             },
             session,
             phase: None,

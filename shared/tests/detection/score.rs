@@ -4,7 +4,8 @@ use std::fmt::Write;
 
 use quietcut_core::detector::Verdict;
 
-use super::listen::{Heard, allowed, bound};
+use super::listen::{FACTORS, Heard, allowed, bound};
+use super::literature;
 use super::session::Phase;
 
 /// Classes of |μ| by their upper ends.
@@ -19,6 +20,9 @@ const CLASSES: [(f64, &str); 6] = [
 
 /// Rotation of a multiplier nearer to ½ than this is a flip.
 const NEAR_HALF: f64 = 0.02;
+
+/// Largest relative error of a chatter frequency that counts as right.
+pub const SAME_FREQUENCY: f64 = 0.01;
 
 /// What a growing cut is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,7 +116,37 @@ pub fn report(heard: &[Heard]) -> String {
     confusion(heard, &mut text);
     onsets(heard, &mut text);
     endings(heard, &mut text);
+    beside(heard, &mut text);
     text
+}
+
+/// The detectors of the literature on the same blocks, at several thresholds, beside this one.
+fn beside(heard: &[Heard], text: &mut String) {
+    let _ = writeln!(
+        text,
+        "\n| detector | threshold over the stable cut | in time | false onsets | per hour |\n|---|---|---|---|---|"
+    );
+    let (onsets, hours) = false_onsets(heard);
+    let (timely, scored) = in_time(heard);
+    let mut line = |name: &str, threshold: &str, timely: usize, onsets: usize| {
+        let _ = writeln!(
+            text,
+            "| {name} | {threshold} | {timely} of {scored} | {onsets} | {:.1} |",
+            onsets as f64 / hours
+        );
+    };
+    line("quietcut", "none", timely, onsets);
+    for (detector, name) in literature::NAMES.into_iter().enumerate() {
+        for (n, factor) in FACTORS.into_iter().enumerate() {
+            let alarms = |h: &Heard| h.literature[detector][n];
+            let timely = heard
+                .iter()
+                .filter(|h| h.delay_of(alarms(h).1).is_some_and(|delay| is_timely(h, delay)))
+                .count();
+            let onsets = heard.iter().map(|h| alarms(h).0).sum();
+            line(name, &format!("{factor}"), timely, onsets);
+        }
+    }
 }
 
 fn delays(heard: &[Heard], text: &mut String) {
@@ -271,18 +305,8 @@ fn endings(heard: &[Heard], text: &mut String) {
         "{:.2} changes of the verdict per second, at most {most} within one",
         changes as f64 / seconds
     );
-    let errors: Vec<f64> = heard
-        .iter()
-        .filter(|h| h.alarm_s.is_some() && h.clock_s.is_some())
-        .filter_map(|h| {
-            let hz = h.session.floquet.as_ref()?.frequency_hz;
-            Some(
-                h.frequency_hz
-                    .map_or(f64::INFINITY, |said| (said / hz - 1.0).abs()),
-            )
-        })
-        .collect();
-    let right = errors.iter().filter(|error| **error < 0.01).count();
+    let errors: Vec<f64> = heard.iter().filter_map(Heard::frequency_error).collect();
+    let right = errors.iter().filter(|error| **error < SAME_FREQUENCY).count();
     let _ = writeln!(
         text,
         "chatter frequency within 1 % in {right} of {} alarms",

@@ -17,6 +17,8 @@ const START_NS: f64 = 1e9;
 pub struct Sensed {
     pub block: Block,
     pub edges: Vec<Edge>,
+    /// Times of these pulses, s.
+    pub edges_s: Vec<f64>,
     pub truth: Truth,
     /// End of the block, s.
     pub time_s: f64,
@@ -76,7 +78,8 @@ impl<'a> Sensors<'a> {
         self.pending = later;
         Some(Sensed {
             block,
-            edges: due.into_iter().map(|time| Edge { time: at(time) }).collect(),
+            edges: due.iter().map(|&time| Edge { time: at(time) }).collect(),
+            edges_s: due,
             truth: self.motion.truth()?,
             time_s,
         })

@@ -98,6 +98,7 @@ pub(crate) fn report() -> Report {
             multiplier_abs: Some(1.02),
             confidence: 0.98,
         },
+        alarm: false,
         advice: Some(Advice {
             action: Action::Speed,
             speed: Rpm(1480.0),
