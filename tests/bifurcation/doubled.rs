@@ -16,8 +16,7 @@ const CASE: &str = "hardening-flip";
 const RPM: f64 = 2010.0;
 
 /// Tooth passings over which the depth of a simulated cut grows, and over which it decreases. A choice: the passage of the
-/// fold is then delayed by less than one percent of the depth. It grows with
-/// the rate to the power 2/3.
+/// fold is then delayed by less than one percent of the depth. The delay grows with the rate to the power 2/3.
 const PASSINGS: usize = 8_000;
 
 fn answer() -> Value {

@@ -86,14 +86,7 @@ pub fn branch_chart(
         is_displacement: !strobe.is_empty(),
         direction: largest_direction(branch),
     };
-    let dots: Vec<(f64, f64)> = strobe
-        .iter()
-        .flat_map(|set| {
-            set.displacement_mm
-                .iter()
-                .map(|at| (set.value, at[ordinate.direction]))
-        })
-        .collect();
+    let dots = dots(strobe, ordinate.direction);
     let orbits = branch.points.iter().map(|at| ordinate.of_point(at).1);
     let beside = heights_of(doubled, ordinate);
     let heights = span(orbits.chain(dots.iter().map(|dot| dot.1)).chain(beside));
@@ -126,6 +119,15 @@ pub fn branch_chart(
         };
         legend_at(&mut chart, corner)
     })
+}
+
+/// Dots of simulated cuts in one direction of the tool.
+fn dots(strobe: &[Strobe<'_>], direction: usize) -> Vec<(f64, f64)> {
+    let of_set = |set: &Strobe<'_>| -> Vec<(f64, f64)> {
+        let displacements = set.displacement_mm.iter();
+        displacements.map(|at| (set.value, at[direction])).collect()
+    };
+    strobe.iter().flat_map(of_set).collect()
 }
 
 fn draw_strobe(chart: &mut Axes<'_, '_>, dots: &[(f64, f64)]) -> Result<(), PictureError> {

@@ -104,11 +104,7 @@ impl<'a> BifurcationOutput<'a> {
                 .into_iter()
                 .map(|(name, intervals)| (format!("{name}_{unit}"), json!(intervals)))
                 .collect(),
-            doubled: computed
-                .doubled
-                .iter()
-                .map(|of_flip| doubled(request.vary, of_flip, branch, directions))
-                .collect(),
+            doubled: doubled(request.vary, computed, directions),
             curves: computed
                 .curves
                 .iter()

@@ -107,6 +107,14 @@ impl Computed {
         let beside = found.flat_map(|found| found.bistable(&self.branch));
         let mut all: Vec<[f64; 2]> = self.branch.bistable().into_iter().chain(beside).collect();
         all.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        // Doubled orbits between two flips are found from both.
+        all.dedup_by(|next, last| {
+            let overlaps = next[0] < last[1];
+            if overlaps {
+                last[1] = last[1].max(next[1]);
+            }
+            overlaps
+        });
         all
     }
 }

@@ -12,13 +12,15 @@ use crate::orbit::{Branch, DoubledBranch, Event, Parameter};
 use crate::report::digits::significant;
 use crate::stability::StabilityLoss;
 
+/// Answers for the doubled orbits from all flips.
+pub(super) fn doubled(vary: Parameter, computed: &Computed, directions: usize) -> Vec<Map<String, Value>> {
+    let all = computed.doubled.iter();
+    all.map(|of_flip| of_one_flip(vary, of_flip, &computed.branch, directions))
+        .collect()
+}
+
 /// Answer for the doubled orbits from one flip. Multipliers and kinds of bifurcations are those over two tooth periods.
-pub(super) fn doubled(
-    vary: Parameter,
-    of_flip: &Doubled,
-    forced: &Branch,
-    directions: usize,
-) -> Map<String, Value> {
+fn of_one_flip(vary: Parameter, of_flip: &Doubled, forced: &Branch, directions: usize) -> Map<String, Value> {
     let mut map = Map::new();
     map.insert("event".into(), json!(of_flip.event));
     if let Some(found) = &of_flip.found {

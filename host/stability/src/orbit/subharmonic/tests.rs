@@ -48,14 +48,10 @@ fn near_the_flip_the_doubling_has_the_size_of_the_normal_form() {
         assert_eq!(found.is_supercritical(), is_supercritical);
         let near = doubled.branch.points.iter().enumerate();
         let (index, at) = near
-            .take_while(|(_, at)| (at.value / flip.value - 1.0).abs() < 2e-3)
+            .take_while(|(_, at)| (at.value / flip.value - 1.0).abs() < 3e-4)
             .last()
             .unwrap();
-        assert!(
-            (at.value > flip.value) == is_supercritical && index > 0,
-            "{}",
-            at.value
-        );
+        assert!((at.value > flip.value) == is_supercritical, "{}", at.value);
         let up_to = [0.0, at.value];
         let forced = follow(&problem, setting, Parameter::Depth, up_to, Extent::Whole).unwrap();
         let excess = forced.points.last().unwrap().multiplier_abs - 1.0;
@@ -65,7 +61,8 @@ fn near_the_flip_the_doubling_has_the_size_of_the_normal_form() {
             "{rpm} rev/min, {} mm: {followed_mm} mm, normal form {predicted_mm} mm",
             at.value
         );
-        // The next order of the normal form changes the size by a few percent 0.2 % beside the flip.
+        // The next order of the normal form changes the size by 16 % 0.2 % beside the subcritical flip, where a tooth enters
+        // nearly at a zero of the doubling, and in proportion to the distance from the flip.
         assert!((followed_mm / predicted_mm - 1.0).abs() < 0.05);
     }
 }
@@ -103,25 +100,26 @@ fn the_doubled_orbits_turn_back_in_a_fold_and_gain_stability_there() {
 #[test]
 fn over_the_speed_the_doubled_orbits_lead_from_one_flip_to_the_next() {
     let problem = hardening();
-    let setting = problem.setting(0.0, 1.6);
-    let (branch, doubled) = doubled_of(&problem, setting, Parameter::Rpm, [1900.0, 2060.0]);
+    let setting = problem.setting(0.0, 1.36);
+    let (branch, doubled) = doubled_of(&problem, setting, Parameter::Rpm, [1950.0, 2100.0]);
     let flips: Vec<&Event> = branch.events.iter().collect();
     assert!(flips.len() == 2 && flips.iter().all(|event| event.kind == StabilityLoss::Flip));
+    // They pass the second flip, which is subcritical, return in a fold and end there.
     assert!(doubled.rejoins);
+    let fold = doubled.fold().unwrap();
+    assert!(fold.value > flips[1].value + 10.0, "{fold:?}");
     let [before, last] = doubled.branch.points.last_chunk::<2>().unwrap();
-    let ends = [before.value.min(last.value), before.value.max(last.value)];
     println!(
-        "second flip at {} rev/min, branch ends within {ends:?}",
-        flips[1].value
+        "second flip at {} rev/min, ends at {} and {}",
+        flips[1].value, before.value, last.value
     );
-    assert!((ends[0] / flips[1].value - 1.0).abs() < 1e-3 && (ends[1] / flips[1].value - 1.0).abs() < 1e-3);
-    // Beyond the second flip a stable doubled orbit lies beside the stable forced one.
-    let zone = doubled.bistable(&branch);
     assert!(
-        zone.len() == 1 && (zone[0][0] / flips[1].value - 1.0).abs() < 1e-6,
-        "{zone:?}"
+        [before, last]
+            .iter()
+            .all(|at| (at.value / flips[1].value - 1.0).abs() < 1e-4)
     );
-    assert!(doubled.branch.points.iter().any(|at| at.value > zone[0][1] - 1.0));
+    let zone = doubled.bistable(&branch);
+    assert_eq!(zone, [[flips[1].value, fold.value]]);
 }
 
 #[test]
