@@ -51,6 +51,13 @@ fn the_guide_leads_to_a_stable_cut() {
         "{damping}"
     );
     assert!(said("--curve torus").contains("torus curve:"));
+    // The bistable zone of the hardening spring: from the fold of the doubled vibration to the limit.
+    let doubled = said("--doubled");
+    assert!(
+        doubled.contains("bistable (depth_mm): 1.3169–1.5858"),
+        "{doubled}"
+    );
+    assert!(said("lobes tests/cases/hardening-flip.toml").contains("bistable 1.317–1.586"));
 
     let drawn = fs::read_to_string(folder.path().join("host/pictures/lobes.svg")).expect("a picture");
     let kept = fs::read_to_string(root().join("host/pictures/lobes.svg")).expect("the picture of the README");

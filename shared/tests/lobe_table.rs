@@ -187,7 +187,7 @@ fn each_fault_has_its_own_error() {
         LobeTable::parse(&bytes).unwrap_err()
     };
     assert_eq!(forged(0, b"PNG!"), TableError::Magic { found: *b"PNG!" });
-    assert_eq!(forged(4, &[3, 0]), TableError::Schema { found: 3, known: 2 });
+    assert_eq!(forged(4, &[4, 0]), TableError::Schema { found: 4, known: 3 });
     assert!(
         matches!(forged(6, &[1]), TableError::Crc { .. }),
         "a header that is not zero where it must be"

@@ -1,4 +1,4 @@
-//! The schemas of the lobe table: frozen bytes, additions of schema 2, refused tables.
+//! The schemas of the lobe table: frozen bytes, additions of schema 2, bistable intervals of schema 3, refused tables.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing)]
 
 // Not every test binary uses all of this module.
@@ -7,7 +7,7 @@ mod support;
 
 use proptest::prelude::*;
 use quietcut_core::checksum::crc32;
-use quietcut_core::lobes::format::{SCHEMA, SCHEMA_PLAIN};
+use quietcut_core::lobes::format::{SCHEMA, SCHEMA_ADDITIONS, SCHEMA_PLAIN};
 use quietcut_core::lobes::{
     Additions, FEED_DIRECTION_SPAN, InterpolationError, IntervalKind, IntervalSlopes, LayerMode, Learned,
     LobeTable, MODES_MAX, NotKnown, Slopes, TableError, TabulatedStability, corrected_limit,
@@ -16,7 +16,7 @@ use quietcut_core::units::{Degrees, Hertz, Millimeters, Rpm};
 use quietcut_core::working_point::WorkingPoint;
 use support::{Owned, acetal, interval, table, validity, working_point};
 
-/// Hexadecimal bytes of tables of both schemas, written when the schema was defined.
+/// Hexadecimal bytes of tables of all schemas, written when the schema was defined.
 const FROZEN: &str = include_str!("lobe_table_schemas.txt");
 
 const MODES: [LayerMode; 2] = [
@@ -75,20 +75,32 @@ fn extended() -> Vec<u8> {
     owned.encode_with(&additions).unwrap()
 }
 
+/// The table of `acetal` with a bistable interval below its flip.
+fn with_bistable() -> Owned {
+    let mut owned = acetal();
+    owned.layers[0].1[1].insert(0, interval(1.25, 1.575, IntervalKind::Bistable, 17.27));
+    owned
+}
+
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[test]
-fn the_bytes_of_both_schemas_are_frozen() {
+fn the_bytes_of_all_schemas_are_frozen() {
     let plain = acetal().encode().unwrap();
-    let now = [format!("1 {}", hex(&plain)), format!("2 {}", hex(&extended()))];
+    let now = [
+        format!("1 {}", hex(&plain)),
+        format!("2 {}", hex(&extended())),
+        format!("3 {}", hex(&with_bistable().encode().unwrap())),
+    ];
     let frozen: Vec<&str> = FROZEN.lines().filter(|line| !line.starts_with('#')).collect();
     if now.iter().map(String::as_str).ne(frozen.iter().copied()) {
         println!("{}", now.join("\n"));
     }
     assert_eq!(now[0], frozen[0]);
     assert_eq!(now[1], frozen[1]);
+    assert_eq!(now[2], frozen[2]);
     assert_eq!(
         frozen.len(),
         usize::from(SCHEMA),
@@ -115,10 +127,59 @@ fn a_table_without_additions_is_of_schema_1() {
 }
 
 #[test]
+fn a_bistable_interval_needs_schema_3_and_is_not_stable() {
+    let owned = with_bistable();
+    let mut bytes = owned.encode().unwrap();
+    let table = LobeTable::parse(&bytes).unwrap();
+    assert_eq!(table.header().unwrap().schema, SCHEMA);
+    let kinds: Vec<IntervalKind> = table
+        .entry(0, 1)
+        .unwrap()
+        .intervals()
+        .iter()
+        .map(|interval| interval.kind)
+        .collect();
+    assert_eq!(
+        kinds,
+        [IntervalKind::Bistable, IntervalKind::Flip, IntervalKind::Hopf]
+    );
+    let at = |depth_mm: f32| table.lookup(Rpm(1036.0), &working_point(&validity(0.15), depth_mm));
+    assert!(matches!(at(1.2), TabulatedStability::Stable { .. }));
+    assert!(matches!(
+        at(1.4),
+        TabulatedStability::Unstable {
+            kind: IntervalKind::Bistable,
+            ..
+        }
+    ));
+    assert!(matches!(
+        at(1.7),
+        TabulatedStability::Unstable {
+            kind: IntervalKind::Flip,
+            ..
+        }
+    ));
+    // The kind of its interval is unknown in the schemas before.
+    for schema in [SCHEMA_PLAIN, SCHEMA_ADDITIONS] {
+        bytes[4..6].copy_from_slice(&schema.to_le_bytes());
+        let crc = crc32([&bytes[..28], &bytes[32..]]);
+        bytes[28..32].copy_from_slice(&crc.to_le_bytes());
+        assert_eq!(
+            LobeTable::parse(&bytes).unwrap_err(),
+            TableError::IntervalOrder {
+                layer: 0,
+                speed: 1,
+                interval: 0
+            }
+        );
+    }
+}
+
+#[test]
 fn additions_are_decoded_as_encoded() {
     let bytes = extended();
     let table = LobeTable::parse(&bytes).unwrap();
-    assert_eq!(table.header().unwrap().schema, SCHEMA);
+    assert_eq!(table.header().unwrap().schema, SCHEMA_ADDITIONS);
     let error = table.interpolation_error().unwrap();
     assert_eq!((error.depth, error.speed), (Millimeters(0.0125), 0.0005));
     assert!((table.feed_direction(0).unwrap().0 - 330.0).abs() < 1e-4);

@@ -4,6 +4,7 @@
 mod answer;
 mod args;
 mod computed;
+mod doubled;
 mod files;
 mod names;
 mod records;

@@ -321,6 +321,12 @@ fn limits_as_text(chart: &Chart, spindle: Option<&Spindle>) -> String {
             line.rpm,
             stable.join(", ")
         );
+        for [from, to] in &line.bistable_mm {
+            let _ = write!(
+                text,
+                "; bistable {from:.3}–{to:.3}: stable unless something knocks the tool"
+            );
+        }
         if let Some(spread) = &line.spread {
             text.push_str("; 5, 50, 95 % percentiles of the limit:");
             let both = percentiles(spread, "beyond")

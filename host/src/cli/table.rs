@@ -288,6 +288,7 @@ fn kind_name(kind: IntervalKind) -> &'static str {
         IntervalKind::Flip => "flip",
         IntervalKind::Fold => "fold",
         IntervalKind::Undecided => "undecided",
+        IntervalKind::Bistable => "bistable",
     }
 }
 

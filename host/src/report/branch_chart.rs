@@ -4,11 +4,12 @@ use plotters::chart::SeriesLabelPosition;
 use plotters::prelude::{Circle, DashedLineSeries, LineSeries, PathElement};
 use plotters::style::{Color, RGBColor};
 
+use super::doubled_lines::{draw_bistable, draw_doubled, heights_of};
 use super::picture::{
     Axes, BLUE, CHATTER, Canvas, INK, Labels, ORANGE, PictureError, VIOLET, axes, draw, label, legend_at,
     span,
 };
-use crate::orbit::{Branch, BranchPoint, Event};
+use crate::orbit::{Branch, BranchPoint, DoubledBranch, Event};
 use crate::stability::StabilityLoss;
 
 /// Width and height in pixels of the diagram.
@@ -19,18 +20,18 @@ const DIRECTIONS: [&str; 3] = ["feed", "normal", "axial"];
 
 /// Quantity over which a bifurcation diagram shows a branch, in one direction of the tool.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Ordinate {
+pub(super) struct Ordinate {
     /// True for the displacement when a tooth enters, false for the amplitude.
-    is_displacement: bool,
-    direction: usize,
+    pub(super) is_displacement: bool,
+    pub(super) direction: usize,
 }
 
 impl Ordinate {
-    fn of_point(self, at: &BranchPoint) -> (f64, f64) {
+    pub(super) fn of_point(self, at: &BranchPoint) -> (f64, f64) {
         (at.value, self.of(at.amplitude_mm, at.displacement_mm))
     }
 
-    fn of_event(self, at: &Event) -> (f64, f64) {
+    pub(super) fn of_event(self, at: &Event) -> (f64, f64) {
         (at.value, self.of(at.amplitude_mm, at.displacement_mm))
     }
 
@@ -63,13 +64,15 @@ pub struct Strobe<'a> {
 
 /// Draws the amplitude of the orbits of a branch over the varied parameter within `range`, in the direction in which it
 /// is largest: stable orbits as a solid line, unstable ones dashed. With simulated cuts it draws their displacement when
-/// a tooth enters as dots, and that of the orbits.
+/// a tooth enters as dots, and that of the orbits. Period-doubled orbits are drawn beside them, and the intervals with two
+/// stable vibrations shaded.
 ///
 /// # Errors
 /// The branch has no orbit or the range no length, or the drawing library fails.
 pub fn branch_chart(
     title: &str,
     branch: &Branch,
+    doubled: &[DoubledBranch],
     range: [f64; 2],
     strobe: &[Strobe<'_>],
 ) -> Result<String, PictureError> {
@@ -83,16 +86,10 @@ pub fn branch_chart(
         is_displacement: !strobe.is_empty(),
         direction: largest_direction(branch),
     };
-    let dots: Vec<(f64, f64)> = strobe
-        .iter()
-        .flat_map(|set| {
-            set.displacement_mm
-                .iter()
-                .map(|at| (set.value, at[ordinate.direction]))
-        })
-        .collect();
+    let dots = dots(strobe, ordinate.direction);
     let orbits = branch.points.iter().map(|at| ordinate.of_point(at).1);
-    let heights = span(orbits.chain(dots.iter().map(|dot| dot.1)));
+    let beside = heights_of(doubled, ordinate);
+    let heights = span(orbits.chain(dots.iter().map(|dot| dot.1)).chain(beside));
     let heights = if ordinate.is_displacement {
         heights
     } else {
@@ -105,9 +102,13 @@ pub fn branch_chart(
         y: &y,
     };
     draw(SIZE, |canvas| {
-        let mut chart = axes(canvas, &labels, low..high, heights)?;
+        let mut chart = axes(canvas, &labels, low..high, heights.clone())?;
+        draw_bistable(&mut chart, branch, doubled, heights)?;
         draw_strobe(&mut chart, &dots)?;
-        draw_runs(&mut chart, &runs(branch, ordinate))?;
+        draw_doubled(&mut chart, doubled, ordinate)?;
+        let of_point = |_: usize, at: &BranchPoint| ordinate.of_point(at);
+        let forced = runs(branch, of_point, |at| ordinate.of_event(at));
+        draw_runs(&mut chart, &forced, INK, ["stable orbit", "unstable orbit"])?;
         let falls = falls(branch, ordinate);
         draw_events(canvas, &mut chart, (branch, falls), ordinate)?;
         // In the corner from which the branch bends away.
@@ -118,6 +119,15 @@ pub fn branch_chart(
         };
         legend_at(&mut chart, corner)
     })
+}
+
+/// Dots of simulated cuts in one direction of the tool.
+fn dots(strobe: &[Strobe<'_>], direction: usize) -> Vec<(f64, f64)> {
+    let of_set = |set: &Strobe<'_>| -> Vec<(f64, f64)> {
+        let displacements = set.displacement_mm.iter();
+        displacements.map(|at| (set.value, at[direction])).collect()
+    };
+    strobe.iter().flat_map(of_set).collect()
 }
 
 fn draw_strobe(chart: &mut Axes<'_, '_>, dots: &[(f64, f64)]) -> Result<(), PictureError> {
@@ -151,13 +161,18 @@ fn largest_direction(branch: &Branch) -> usize {
 
 /// Part of a branch with the same stability.
 #[derive(Clone, Debug, PartialEq)]
-struct Run {
+pub(super) struct Run {
     is_stable: bool,
     points: Vec<(f64, f64)>,
 }
 
-/// The branch in parts, which meet at its bifurcations.
-fn runs(branch: &Branch, ordinate: Ordinate) -> Vec<Run> {
+/// The branch in parts, which meet at its bifurcations, with its points by index and its bifurcations at given places of
+/// the diagram.
+pub(super) fn runs(
+    branch: &Branch,
+    of_point: impl Fn(usize, &BranchPoint) -> (f64, f64),
+    of_event: impl Fn(&Event) -> (f64, f64),
+) -> Vec<Run> {
     let mut runs: Vec<Run> = Vec::new();
     let mut add = |at: (f64, f64), is_stable: bool| match runs.last_mut() {
         Some(run) if run.is_stable == is_stable => run.points.push(at),
@@ -181,21 +196,26 @@ fn runs(branch: &Branch, ordinate: Ordinate) -> Vec<Run> {
         for event in branch.events.iter().filter(|event| event.after == index) {
             let count = event.kind.count();
             outside += if event.gain { -count } else { count };
-            add(ordinate.of_event(event), outside <= 0);
+            add(of_event(event), outside <= 0);
         }
-        add(ordinate.of_point(point), point.outside <= 0);
+        add(of_point(index, point), point.outside <= 0);
     }
     runs
 }
 
-fn draw_runs(chart: &mut Axes<'_, '_>, runs: &[Run]) -> Result<(), PictureError> {
+pub(super) fn draw_runs(
+    chart: &mut Axes<'_, '_>,
+    runs: &[Run],
+    color: RGBColor,
+    names: [&str; 2],
+) -> Result<(), PictureError> {
     let mut named = [false; 2];
     for run in runs {
         let points = run.points.iter().copied();
         let drawn = if run.is_stable {
-            chart.draw_series(LineSeries::new(points, INK.stroke_width(3)))?
+            chart.draw_series(LineSeries::new(points, color.stroke_width(3)))?
         } else {
-            chart.draw_series(DashedLineSeries::new(points, 6, 5, INK.stroke_width(2)))?
+            chart.draw_series(DashedLineSeries::new(points, 6, 5, color.stroke_width(2)))?
         };
         let is_named = &mut named[usize::from(run.is_stable)];
         if *is_named {
@@ -204,12 +224,12 @@ fn draw_runs(chart: &mut Axes<'_, '_>, runs: &[Run]) -> Result<(), PictureError>
         *is_named = true;
         if run.is_stable {
             drawn
-                .label("stable orbit")
-                .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], INK.stroke_width(3)));
+                .label(names[0])
+                .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], color.stroke_width(3)));
         } else {
             drawn
-                .label("unstable orbit")
-                .legend(|(x, y)| PathElement::new([(x, y), (x + 6, y)], INK.stroke_width(2)));
+                .label(names[1])
+                .legend(move |(x, y)| PathElement::new([(x, y), (x + 6, y)], color.stroke_width(2)));
         }
     }
     Ok(())

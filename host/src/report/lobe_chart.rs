@@ -33,6 +33,8 @@ pub struct Column {
     /// Undecided depths, mm, as ascending intervals in which the modulus of the dominant Floquet multiplier is 1 within
     /// the error of the method.
     pub undecided_mm: Vec<(f64, f64)>,
+    /// Intervals of axial depth in which a second vibration is stable too, mm: stable unless something knocks the tool.
+    pub bistable_mm: Vec<(f64, f64)>,
     /// First stability limit at this speed; `None` if none was found up to the largest computed depth, or if the lowest
     /// interval of a lobe table that is not stable is undecided.
     pub first_limit: Option<FirstLimit>,
@@ -53,16 +55,23 @@ impl Column {
 
     fn of_entry(speed: Rpm, entry: &lobes::Column) -> Self {
         let pair = |from: Millimeters, to: Millimeters| (f64::from(from.0), f64::from(to.0));
-        let undecided = entry
+        let of_kind = |kind: lobes::IntervalKind| -> Vec<(f64, f64)> {
+            let intervals = entry.intervals().iter().filter(|interval| interval.kind == kind);
+            intervals
+                .map(|interval| pair(interval.from, interval.to))
+                .collect()
+        };
+        // Below a bistable interval nothing is lost yet: the limit is where the unstable depths above it begin.
+        let mut unstable = entry
             .intervals()
             .iter()
-            .filter(|interval| interval.kind == lobes::IntervalKind::Undecided);
-        let first_limit = entry.first_limit().and_then(|interval| {
+            .filter(|interval| interval.kind != lobes::IntervalKind::Bistable);
+        let first_limit = unstable.next().and_then(|interval| {
             let kind = match interval.kind {
                 lobes::IntervalKind::Hopf => LimitKind::Hopf,
                 lobes::IntervalKind::Flip => LimitKind::Flip,
                 lobes::IntervalKind::Fold => LimitKind::Fold,
-                lobes::IntervalKind::Undecided => return None,
+                lobes::IntervalKind::Undecided | lobes::IntervalKind::Bistable => return None,
             };
             Some(FirstLimit {
                 depth_mm: f64::from(interval.from.0),
@@ -72,9 +81,8 @@ impl Column {
         Self {
             rpm: f64::from(speed.0),
             stable_mm: entry.stable().map(|(from, to)| pair(from, to)).collect(),
-            undecided_mm: undecided
-                .map(|interval| pair(interval.from, interval.to))
-                .collect(),
+            undecided_mm: of_kind(lobes::IntervalKind::Undecided),
+            bistable_mm: of_kind(lobes::IntervalKind::Bistable),
             first_limit,
             percentiles_mm: None,
         }
@@ -87,6 +95,7 @@ impl From<&SpeedLine> for Column {
             rpm: line.rpm,
             stable_mm: line.stable_mm.iter().map(|&[from, to]| (from, to)).collect(),
             undecided_mm: line.undecided_mm.iter().map(|&[from, to]| (from, to)).collect(),
+            bistable_mm: line.bistable_mm.iter().map(|&[from, to]| (from, to)).collect(),
             first_limit: line.first_limit.map(|limit| FirstLimit {
                 depth_mm: limit.depth_mm,
                 kind: limit.kind,
@@ -101,6 +110,7 @@ impl From<&SpeedLine> for Column {
 
 // Fill colour of stable areas. It is opaque, so that overlapping areas do not mix their colours.
 const STABLE: RGBColor = RGBColor(0xd2, 0xea, 0xdc);
+const BISTABLE: RGBColor = RGBColor(0xf7, 0xe3, 0xb5);
 const UNDECIDED: RGBColor = RGBColor(0xd6, 0xd8, 0xdc);
 const UNSTABLE: RGBColor = RGBColor(0xfa, 0xec, 0xec);
 
@@ -153,6 +163,7 @@ pub fn lobe_chart_of_spindle(
         )])?;
         let stable = areas(columns, |column| &column.stable_mm);
         chart.draw_series(stable.into_iter().map(|area| Polygon::new(area, STABLE)))?;
+        draw_bistable(&mut chart, columns)?;
         draw_undecided(&mut chart, columns, depth_max_mm)?;
         draw_percentiles(&mut chart, columns, depth_max_mm)?;
         for kind in [LimitKind::Hopf, LimitKind::Flip, LimitKind::Fold] {
@@ -171,6 +182,19 @@ pub fn lobe_chart_of_spindle(
             .draw()?;
         Ok(())
     })
+}
+
+/// Draws the bistable depths of a lobe diagram over the stable ones.
+fn draw_bistable(chart: &mut Axes<'_, '_>, columns: &[Column]) -> Result<(), PictureError> {
+    let areas = areas(columns, |column| &column.bistable_mm);
+    if areas.is_empty() {
+        return Ok(());
+    }
+    chart
+        .draw_series(areas.into_iter().map(|area| Polygon::new(area, BISTABLE)))?
+        .label("bistable: stable unless knocked")
+        .legend(|(x, y)| Rectangle::new([(x, y - 4), (x + 18, y + 4)], BISTABLE.filled()));
+    Ok(())
 }
 
 /// Draws the undecided depths of a lobe diagram, if any interval of them is at least about one pixel high.
@@ -319,6 +343,7 @@ mod tests {
             rpm,
             stable_mm: stable_mm.to_vec(),
             undecided_mm: Vec::new(),
+            bistable_mm: Vec::new(),
             first_limit,
             percentiles_mm: None,
         }
@@ -408,6 +433,7 @@ mod tests {
         };
         let columns = [
             &[
+                interval(1.25, 1.5, IntervalKind::Bistable),
                 interval(1.5, 2.25, IntervalKind::Flip),
                 interval(2.75, 4.0, IntervalKind::Hopf),
             ][..],
@@ -445,5 +471,11 @@ mod tests {
         assert!(near(limit.depth_mm, 1.5) && limit.kind == LimitKind::Flip);
         assert!(columns[1].stable_mm.is_empty() && columns[1].first_limit.is_none());
         assert_eq!(columns[1].undecided_mm.len(), 1);
+        let [(from, to)] = columns[0].bistable_mm[..] else {
+            panic!("{columns:?}");
+        };
+        assert!(near(from, 1.25) && near(to, 1.5), "{columns:?}");
+        let chart = lobe_chart("robot", &columns, 4.0, &[]).unwrap();
+        assert!(chart.contains("bistable: stable unless knocked"));
     }
 }

@@ -8,6 +8,7 @@ pub mod comparison;
 pub mod curve_chart;
 pub mod diagnosis;
 pub mod digits;
+mod doubled_lines;
 pub mod frf_chart;
 pub mod frf_comparison_chart;
 pub mod lobe_chart;

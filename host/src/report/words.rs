@@ -182,13 +182,16 @@ pub fn obstacle(obstacle: &Obstacle) -> String {
 }
 
 /// Text of the reason why a lobe table does not call an interval of axial depths stable: Hopf, period doubling, fold,
-/// or an undecided computation.
+/// an undecided computation, or a second stable vibration.
 pub fn limit(kind: lobes::IntervalKind) -> &'static str {
     match kind {
         lobes::IntervalKind::Hopf => "chatter at a frequency not synchronous with the teeth (Hopf)",
         lobes::IntervalKind::Flip => "chatter with the period of two teeth (period doubling)",
         lobes::IntervalKind::Fold => "the forced vibration jumps (fold)",
         lobes::IntervalKind::Undecided => "the computation could not decide",
+        lobes::IntervalKind::Bistable => {
+            "stable unless something knocks the tool, then a larger vibration stays (bistable)"
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 use super::bytes::saturate;
 use super::format::{HEADER_LENGTH, Header, MAX_INTERVALS};
 use super::shape::Shape;
-use super::{IMMERSION_TOLERANCE, LobeTable, TableError, Validity};
+use super::{IMMERSION_TOLERANCE, IntervalKind, LobeTable, TableError, Validity};
 use crate::units::{Degrees, Rpm};
 
 impl<'a> LobeTable<'a> {
@@ -83,6 +83,7 @@ fn check_column(
     for (position, interval) in shape.column(bytes, layer, speed).ok_or(misplaced)?.enumerate() {
         let interval = interval
             .filter(|i| i.from.0 >= end_mm && i.from < i.to && i.to.0 <= shape.depth_to_mm)
+            .filter(|i| shape.has_bistable || i.kind != IntervalKind::Bistable)
             .ok_or(interval_order(layer, speed, position))?;
         end_mm = interval.to.0;
     }

@@ -4,11 +4,11 @@ use super::additions::{Additions, direction_code};
 use super::bytes::saturate;
 use super::check::{check_layers, check_speeds, interval_order};
 use super::format::{
-    ERROR_GIVEN, HEADER_LENGTH, Header, MAX_INTERVALS, MODES_SHIFT, NAME_CAPACITY, SCHEMA, SCHEMA_PLAIN,
-    STEPS,
+    ERROR_GIVEN, HEADER_LENGTH, Header, MAX_INTERVALS, MODES_SHIFT, NAME_CAPACITY, SCHEMA, SCHEMA_ADDITIONS,
+    SCHEMA_PLAIN, STEPS,
 };
 use super::shape::{Shape, kind_code};
-use super::{Interval, LobeTable, TableError, Validity, half};
+use super::{Interval, IntervalKind, LobeTable, TableError, Validity, half};
 use crate::units::{Millimeters, Rpm};
 use crate::working_point::Limits;
 
@@ -56,7 +56,8 @@ pub fn encode<'b>(content: &Content<'_>, buffer: &'b mut [u8]) -> Result<&'b [u8
     encode_with(content, &Additions::default(), buffer)
 }
 
-/// Writes a lobe table with the optional parts of schema 2. If all of them are empty, the bytes are those of schema 1.
+/// Writes a lobe table with the optional parts of schema 2. If all of them are empty, and no interval is bistable, the
+/// bytes are those of schema 1.
 pub fn encode_with<'b>(
     content: &Content<'_>,
     additions: &Additions<'_>,
@@ -87,7 +88,11 @@ pub fn encode_with<'b>(
         .ok_or(TableError::Buffer { needed, found })?;
     write_payload(content, additions, &shape, payload)?;
     let header = Header {
-        schema: if shape.is_extended { SCHEMA } else { SCHEMA_PLAIN },
+        schema: match (shape.has_bistable, shape.is_extended) {
+            (true, _) => SCHEMA,
+            (false, true) => SCHEMA_ADDITIONS,
+            (false, false) => SCHEMA_PLAIN,
+        },
         length: needed as u32,
         generation: 0,
         crc: 0,
@@ -105,6 +110,7 @@ fn shape_of(content: &Content<'_>, additions: &Additions<'_>) -> Shape {
             .flat_map(|layer| layer.columns)
             .flat_map(|column| column.iter())
     };
+    let has_bistable = intervals().any(|interval| interval.kind == IntervalKind::Bistable);
     Shape {
         teeth: content.teeth,
         limits: content.limits,
@@ -116,7 +122,8 @@ fn shape_of(content: &Content<'_>, additions: &Additions<'_>) -> Shape {
         speeds: content.speeds.len(),
         intervals: intervals().count(),
         name_length: content.name.len(),
-        is_extended: !additions.is_empty(),
+        is_extended: has_bistable || !additions.is_empty(),
+        has_bistable,
         error_given: additions.interpolation_error.is_some(),
         modes: additions.mode_count(),
     }

@@ -1,9 +1,9 @@
-//! The bytes of a table, schemas 1 and 2. All numbers are little-endian and unaligned.
+//! The bytes of a table, schemas 1 to 3. All numbers are little-endian and unaligned.
 //!
 //! | offset | bytes | header |
 //! |---|---|---|
 //! | 0 | 4 | magic `QCLT` |
-//! | 4 | 2 | schema: [`SCHEMA_PLAIN`] or [`SCHEMA`] |
+//! | 4 | 2 | schema: [`SCHEMA_PLAIN`], [`SCHEMA_ADDITIONS`] or [`SCHEMA`] |
 //! | 6 | 2 | zero |
 //! | 8 | 4 | length of the whole table in bytes, header included |
 //! | 12 | 4 | generation: 0 in a file; the device increments it to find the newer of its two slots |
@@ -16,7 +16,7 @@
 //! | 33 | 1 | length of the name in bytes |
 //! | 34 | 2 | L, number of layers |
 //! | 36 | 2 | S, number of speeds |
-//! | 38 | 2 | flags: bit 0 machine's limits given; schema 2: bit 1 interpolation error given, bits 8–15 M |
+//! | 38 | 2 | flags: bit 0 machine's limits given; schema 2 on: bit 1 interpolation error given, bits 8–15 M |
 //! | 40 | 4+4 | slowest and fastest speed of the machine, f32, rev/min |
 //! | 48 | 4+4 | smallest and largest depth of the table, f32, mm |
 //! | 56 | 4 | largest chatter frequency, f32, Hz: the scale of all chatter frequencies |
@@ -25,13 +25,13 @@
 //! | 96 | 24·L | layers, each of 24 bytes as described below |
 //! | … | 4·S | speeds, f32, rev/min, strictly ascending, steps of any size |
 //! | … | 2·L·(S+1) | per layer: index of each speed's first interval, counted in the layer, u16; one more for the end |
-//! | … | 8·I | intervals: from, to, chatter (u16 each), kind (1 byte: 0 Hopf, 1 flip, 2 fold, 3 undecided), 1 zero |
-//! | … | 4+4 | schema 2, where flagged: interpolation error in depth (f32, mm) and in speed (f32, relative) |
-//! | … | 8·L·M | schema 2: per layer its modes: natural frequency (f32, Hz), damping ratio (f32) |
-//! | … | 4·(2M+1)·I | schema 2, where M > 0: per interval the derivatives of `from`, then those of `to` |
+//! | … | 8·I | intervals: from, to, chatter (u16 each), kind (1 byte: 0 Hopf, 1 flip, 2 fold, 3 undecided; schema 3: 4 bistable), 1 zero |
+//! | … | 4+4 | schema 2 on, where flagged: interpolation error in depth (f32, mm) and in speed (f32, relative) |
+//! | … | 8·L·M | schema 2 on: per layer its modes: natural frequency (f32, Hz), damping ratio (f32) |
+//! | … | 4·(2M+1)·I | schema 2 on, where M > 0: per interval the derivatives of `from`, then those of `to` |
 //!
 //! A layer has feed from and feed to (f32, mm), start and exit (f32, degrees), posture (1 byte), 3 further bytes, and
-//! the index of its first interval (u32). The 3 bytes are zeros in schema 1. In schema 2 they are 1 if a feed
+//! the index of its first interval (u32). The 3 bytes are zeros in schema 1. From schema 2 on they are 1 if a feed
 //! direction is given, else 0 (1 byte), and the feed direction (u16, 1/100 degree).
 //!
 //! M is the number of modes of each layer. The derivatives of an interval end are those by the natural frequency of
@@ -47,9 +47,10 @@
 //! # Schemas
 //!
 //! The header never changes. Schema 1 is a table without additions. Tables without additions are always written in
-//! schema 1, so that devices with older firmware accept them. Schema 2 has the additions marked above. A reader
+//! schema 1, so that devices with older firmware accept them. Schema 2 has the additions marked above. Schema 3 is schema
+//! 2 with bistable intervals; a table is written in it only if it has one. A reader
 //! refuses every other schema with [`TableError::Schema`](super::TableError::Schema) before it reads beyond the
-//! header, and refuses unknown flags of schema 2.
+//! header, and refuses unknown flags of schemas 2 and 3.
 //!
 //! A further addition needs a higher [`SCHEMA`], goes to the end of the table, and has its bytes frozen in the tests.
 
@@ -58,7 +59,9 @@ pub use super::header::Header;
 /// The first four bytes of a lobe table.
 pub const MAGIC: [u8; 4] = *b"QCLT";
 /// The latest schema of lobe tables that this code reads and writes.
-pub const SCHEMA: u16 = 2;
+pub const SCHEMA: u16 = 3;
+/// The schema of lobe tables with optional parts and without bistable intervals.
+pub const SCHEMA_ADDITIONS: u16 = 2;
 /// The schema of lobe tables without optional parts.
 pub const SCHEMA_PLAIN: u16 = 1;
 /// Length of the header of a lobe table, in bytes.
@@ -80,7 +83,7 @@ pub(super) const STEPS: f32 = 65_535.0;
 pub(super) const ERROR_GIVEN: u16 = 2;
 /// Bit position of the number of modes in the flags of a lobe table.
 pub(super) const MODES_SHIFT: u16 = 8;
-/// All flag bits of a lobe table of schema 2, without the bits of the number of modes.
+/// All flag bits of a lobe table of schemas 2 and 3, without the bits of the number of modes.
 pub(super) const KNOWN_FLAGS: u16 = 1 | ERROR_GIVEN;
 
 /// Number of codes for the feed direction in 360°: one per 1/100 degree.

@@ -4,7 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use super::TableError;
 use super::bytes::{array_at, saturate, u16_at, u32_at};
-use super::format::{CRC_OFFSET, HEADER_LENGTH, LAYERS_OFFSET, MAGIC, SCHEMA, SCHEMA_PLAIN};
+use super::format::{
+    CRC_OFFSET, HEADER_LENGTH, LAYERS_OFFSET, MAGIC, SCHEMA, SCHEMA_ADDITIONS, SCHEMA_PLAIN,
+};
 use crate::checksum::{Crc32, crc32};
 
 /// The first [`HEADER_LENGTH`] bytes of a lobe table.
@@ -24,7 +26,7 @@ pub struct Header {
 impl Header {
     /// True if this code can read lobe tables of this schema.
     pub const fn knows(schema: u16) -> bool {
-        schema == SCHEMA_PLAIN || schema == SCHEMA
+        matches!(schema, SCHEMA_PLAIN | SCHEMA_ADDITIONS | SCHEMA)
     }
 
     /// Reads the header of a lobe table at the beginning of `bytes`. Refuses too few bytes, a wrong magic number, an

@@ -18,6 +18,9 @@ pub enum IntervalKind {
     Fold,
     /// Undecided: the Floquet multiplier lies on the unit circle within its error bound, or the computation failed.
     Undecided,
+    /// Bistable: the forced vibration is stable, and so is a larger one, such as the period-doubled vibration below a
+    /// subcritical flip. The cut is stable unless something knocks the tool.
+    Bistable,
 }
 
 /// A half-open interval [from, to) of axial depths at which the cut is not stable.

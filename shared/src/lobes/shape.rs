@@ -6,7 +6,7 @@ use super::additions::InterpolationError;
 use super::bytes::{f32_at, saturate, u16_at, u32_at};
 use super::format::{
     ERROR_GIVEN, ERROR_LENGTH, FLAGS_OFFSET, INTERVAL_LENGTH, KNOWN_FLAGS, LAYER_LENGTH, LAYERS_OFFSET,
-    MODE_LENGTH, MODES_SHIFT, NAME_CAPACITY, NAME_OFFSET, SCHEMA, STEPS, TURN,
+    MODE_LENGTH, MODES_SHIFT, NAME_CAPACITY, NAME_OFFSET, SCHEMA, SCHEMA_ADDITIONS, STEPS, TURN,
 };
 use super::half;
 use super::slopes::{IntervalSlopes, LayerMode, MODES_MAX, Slopes};
@@ -26,8 +26,10 @@ pub(super) struct Shape {
     pub(super) speeds: usize,
     pub(super) intervals: usize,
     pub(super) name_length: usize,
-    /// True for schema 2.
+    /// True for schema 2 and above.
     pub(super) is_extended: bool,
+    /// True for schema 3: intervals may be bistable.
+    pub(super) has_bistable: bool,
     /// True if the lobe table states its interpolation error.
     pub(super) error_given: bool,
     /// Number of modes per table layer by whose parameters the table contains derivatives; 0 without derivatives.
@@ -63,7 +65,8 @@ impl Shape {
             rpm_max: Rpm(f32_at(bytes, 44)?),
         };
         let flags = u16_at(bytes, FLAGS_OFFSET)?;
-        let is_extended = u16_at(bytes, 4)? == SCHEMA;
+        let schema = u16_at(bytes, 4)?;
+        let is_extended = schema >= SCHEMA_ADDITIONS;
         Some(Self {
             teeth: *bytes.get(32)?,
             limits: (flags & 1 != 0).then_some(limits),
@@ -75,6 +78,7 @@ impl Shape {
             intervals: u32_at(bytes, 60)? as usize,
             name_length: usize::from(*bytes.get(33)?),
             is_extended,
+            has_bistable: schema == SCHEMA,
             error_given: is_extended && flags & ERROR_GIVEN != 0,
             modes: if is_extended {
                 usize::from(flags >> MODES_SHIFT)
@@ -311,7 +315,7 @@ impl Shape {
     }
 }
 
-/// Refuses unknown flags of a lobe table of schema 2, and more than [`MODES_MAX`] modes. In schema 1 all flags except
+/// Refuses unknown flags of a lobe table of schema 2 or 3, and more than [`MODES_MAX`] modes. In schema 1 all flags except
 /// the first are ignored.
 fn check_flags(flags: u16, is_extended: bool) -> Result<(), TableError> {
     let modes = usize::from(flags >> MODES_SHIFT);
@@ -327,6 +331,7 @@ pub(super) fn kind_code(kind: IntervalKind) -> u8 {
         IntervalKind::Flip => 1,
         IntervalKind::Fold => 2,
         IntervalKind::Undecided => 3,
+        IntervalKind::Bistable => 4,
     }
 }
 
@@ -336,6 +341,7 @@ fn kind_of(code: u8) -> Option<IntervalKind> {
         1 => IntervalKind::Flip,
         2 => IntervalKind::Fold,
         3 => IntervalKind::Undecided,
+        4 => IntervalKind::Bistable,
         _ => return None,
     })
 }

@@ -140,7 +140,8 @@ pub(crate) fn kind() -> impl Strategy<Value = IntervalKind> {
         Just(IntervalKind::Hopf),
         Just(IntervalKind::Flip),
         Just(IntervalKind::Fold),
-        Just(IntervalKind::Undecided)
+        Just(IntervalKind::Undecided),
+        Just(IntervalKind::Bistable)
     ]
 }
 

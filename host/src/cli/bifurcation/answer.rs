@@ -4,6 +4,7 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use super::computed::{Broken, Computed};
+use super::doubled::doubled;
 use super::names::{criticality_word, word};
 use super::request::Request;
 use super::strobe::StrobeSet;
@@ -21,9 +22,11 @@ pub(super) struct BifurcationOutput<'a> {
     teeth: usize,
     branch: Vec<Map<String, Value>>,
     events: Vec<Map<String, Value>>,
-    /// Intervals of the varied parameter with a stable orbit on the branch, and with two.
+    /// Intervals of the varied parameter with a stable orbit on the branch, and with two stable vibrations.
     #[serde(flatten)]
     intervals: Map<String, Value>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    doubled: Vec<Map<String, Value>>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     curves: Vec<Value>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -33,7 +36,7 @@ pub(super) struct BifurcationOutput<'a> {
 }
 
 /// Ending of keys for the unit of a parameter.
-fn unit(parameter: Parameter) -> &'static str {
+pub(super) fn unit(parameter: Parameter) -> &'static str {
     match parameter {
         Parameter::Depth | Parameter::Feed => "mm",
         Parameter::Rpm => "rpm",
@@ -73,7 +76,7 @@ impl<'a> BifurcationOutput<'a> {
         let first = first_loss(computed);
         let unit = unit(request.vary);
         let fixed = Parameter::ALL.into_iter().filter(|other| *other != request.vary);
-        let intervals = [("stable", branch.stable()), ("bistable", branch.bistable())];
+        let intervals = [("stable", branch.stable()), ("bistable", computed.bistable())];
         Self {
             varied: request.vary.name(),
             fixed: fixed
@@ -101,6 +104,7 @@ impl<'a> BifurcationOutput<'a> {
                 .into_iter()
                 .map(|(name, intervals)| (format!("{name}_{unit}"), json!(intervals)))
                 .collect(),
+            doubled: doubled(request.vary, computed, directions),
             curves: computed
                 .curves
                 .iter()
@@ -116,7 +120,7 @@ impl<'a> BifurcationOutput<'a> {
     }
 }
 
-fn point(vary: Parameter, at: &BranchPoint, directions: usize) -> Map<String, Value> {
+pub(super) fn point(vary: Parameter, at: &BranchPoint, directions: usize) -> Map<String, Value> {
     let mut map = Map::new();
     map.insert(vary.key().into(), json!(at.value));
     map.insert("amplitude_mm".into(), json!(at.amplitude_mm[..directions]));

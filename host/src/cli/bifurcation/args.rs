@@ -41,6 +41,10 @@ pub struct Args {
     /// Both parameters of the curves, P1,P2; a chart shows P1 horizontally and P2 vertically. One is that of --vary.
     #[arg(long = "in", value_name = "P1,P2", value_parser = plane, requires = "curve")]
     pub(super) plane: Option<[Parameter; 2]>,
+    /// Follow the period-doubled orbits from each flip at which the forced orbits lose or regain stability. Where they turn back in a
+    /// fold below a subcritical flip, a cut is bistable: stable unless something knocks it.
+    #[arg(long)]
+    pub(super) doubled: bool,
     /// Simulate a cut at each value of --range, first:last:count (61 without a count), and show the displacement of the tool
     /// once per tooth passing behind the branch: a stroboscopic bifurcation diagram.
     #[arg(long)]

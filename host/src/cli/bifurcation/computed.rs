@@ -2,11 +2,15 @@
 
 use super::super::Error;
 use super::names::word;
-use super::records::Records;
+use super::records::{DoubledRecords, Records};
 use super::request::{CurveRequest, Request};
 use super::strobe::StrobeSet;
 use crate::orbit::curve::{Curve, CurveError, CurveSeed, follow_curve};
-use crate::orbit::{Branch, Criticality, Extent, ForcedProblem, OrbitError, criticality, follow_recorded};
+use crate::orbit::{
+    Branch, Criticality, DoubledBranch, Extent, ForcedProblem, OrbitError, criticality, follow_doubled,
+    follow_recorded,
+};
+use crate::stability::StabilityLoss;
 
 /// What was computed.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,11 +19,24 @@ pub(super) struct Computed {
     pub(super) branch: Branch,
     /// Criticality of each bifurcation of the branch, where it is known.
     pub(super) criticality: Vec<Option<Criticality>>,
+    /// Period-doubled orbits from its flips.
+    pub(super) doubled: Vec<Doubled>,
     /// Its curves in two parameters.
     pub(super) curves: Vec<Curve>,
     /// Stroboscopic diagram of simulated cuts.
     pub(super) strobe: Vec<StrobeSet>,
     /// Reason why the branch ends early, and what to try.
+    pub(super) broken: Option<Broken>,
+}
+
+/// Period-doubled orbits from a flip of the branch.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Doubled {
+    /// Index of the flip among the bifurcations of the branch.
+    pub(super) event: usize,
+    /// The doubled orbits; `None` if not even one is found.
+    pub(super) found: Option<DoubledBranch>,
+    /// Reason why they end early, and what to try.
     pub(super) broken: Option<Broken>,
 }
 
@@ -55,6 +72,11 @@ pub(super) fn compute(
         Some(curves) => follow_curves(problem, request, curves, &branch, records)?,
         None => Vec::new(),
     };
+    let doubled = if request.doubled {
+        follow_all_doubled(problem, request, &branch, records)?
+    } else {
+        Vec::new()
+    };
     let criticality = branch
         .events
         .iter()
@@ -63,10 +85,69 @@ pub(super) fn compute(
     Ok(Computed {
         branch,
         criticality,
+        doubled,
         curves,
         strobe: Vec::new(),
         broken,
     })
+}
+
+impl Computed {
+    /// The doubled branches that were found.
+    pub(super) fn doubled_branches(&self) -> Vec<DoubledBranch> {
+        self.doubled
+            .iter()
+            .filter_map(|doubled| doubled.found.clone())
+            .collect()
+    }
+
+    /// Intervals of the varied parameter in which two forced orbits are stable, or a doubled one beside a forced one.
+    pub(super) fn bistable(&self) -> Vec<[f64; 2]> {
+        let found = self.doubled.iter().filter_map(|doubled| doubled.found.as_ref());
+        let beside = found.flat_map(|found| found.bistable(&self.branch));
+        let mut all: Vec<[f64; 2]> = self.branch.bistable().into_iter().chain(beside).collect();
+        all.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        // Doubled orbits between two flips are found from both.
+        all.dedup_by(|next, last| {
+            let overlaps = next[0] < last[1];
+            if overlaps {
+                last[1] = last[1].max(next[1]);
+            }
+            overlaps
+        });
+        all
+    }
+}
+
+/// Follows the doubled orbits from each flip on whose one side the forced orbits are stable.
+fn follow_all_doubled(
+    problem: &ForcedProblem,
+    request: &Request,
+    branch: &Branch,
+    records: &mut Records,
+) -> Result<Vec<Doubled>, Error> {
+    let mut all = Vec::new();
+    let mut outside = branch.points.first().map_or(0, |point| point.outside);
+    for (event, at) in branch.events.iter().enumerate() {
+        let count = at.kind.count();
+        let before = outside;
+        outside += if at.gain { -count } else { count };
+        if at.kind != StabilityLoss::Flip || before.min(outside) > 0 {
+            continue;
+        }
+        let (vary, range) = (request.vary, request.range);
+        let mut journal = DoubledRecords { records, event };
+        let (found, broken) = match follow_doubled(problem, request.setting, vary, range, at, &mut journal) {
+            Ok(found) => (Some(found), None),
+            Err(broken) => match broken.cause {
+                OrbitError::NotCovered { .. } => return Err(Error::input(broken.cause)),
+                OrbitError::Journal { .. } => return Err(records.failed()),
+                cause => (broken.branch.map(|found| *found), Some(Broken::of(cause))),
+            },
+        };
+        all.push(Doubled { event, found, broken });
+    }
+    Ok(all)
 }
 
 fn follow_curves(

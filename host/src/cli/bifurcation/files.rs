@@ -55,7 +55,15 @@ impl Shown<'_> {
     fn branch(&self) -> Result<String, Error> {
         let title = format!("{}, {}", self.name, fixed(self.request));
         let strobe: Vec<Strobe<'_>> = self.computed.strobe.iter().map(Strobe::from).collect();
-        branch_chart(&title, &self.computed.branch, self.request.range, &strobe).map_err(Error::input)
+        let doubled = self.computed.doubled_branches();
+        branch_chart(
+            &title,
+            &self.computed.branch,
+            &doubled,
+            self.request.range,
+            &strobe,
+        )
+        .map_err(Error::input)
     }
 
     /// Chart of the curves, if there are any.
@@ -75,7 +83,7 @@ impl Shown<'_> {
 
     fn page(&self) -> Result<String, Error> {
         let caption = "Amplitude (half peak-to-peak) of the forced orbits. Solid: stable; dashed: unstable. Points: bifurcations; the \
-                       ring marks the first loss of stability.";
+                       ring marks the first loss of stability. Shaded: a period-doubled vibration is stable beside the forced one.";
         let of_curves = "Bifurcations over two parameters. Solid: the orbits are stable on one side of the curve; dashed: they are unstable \
                          on both. 1:3 and 1:4: strong resonances.";
         let body = maud::html! {

@@ -95,6 +95,8 @@ enum Line {
     Branch(BranchRecord),
     /// Orbit of a curve on one side of its start.
     Curve(usize, usize, CurveRecord),
+    /// Period-doubled orbit from the flip of this index among the bifurcations of the branch.
+    Doubled(usize, BranchRecord),
 }
 
 /// Orbits recorded so far, and the file to which the next ones are appended.
@@ -246,13 +248,34 @@ impl BranchJournal for Records {
     fn recorded(&mut self) -> Vec<BranchRecord> {
         let of_branch = self.lines.iter().filter_map(|line| match line {
             Line::Branch(record) => Some(record.clone()),
-            Line::Curve(..) => None,
+            Line::Curve(..) | Line::Doubled(..) => None,
         });
         of_branch.collect()
     }
 
     fn record(&mut self, record: &BranchRecord) -> bool {
         self.keep(Line::Branch(record.clone()))
+    }
+}
+
+/// Records of the doubled orbits from one flip.
+pub(super) struct DoubledRecords<'a> {
+    pub(super) records: &'a mut Records,
+    /// Index of the flip among the bifurcations of the branch.
+    pub(super) event: usize,
+}
+
+impl BranchJournal for DoubledRecords<'_> {
+    fn recorded(&mut self) -> Vec<BranchRecord> {
+        let of_flip = self.records.lines.iter().filter_map(|line| match line {
+            Line::Doubled(event, record) if *event == self.event => Some(record.clone()),
+            _ => None,
+        });
+        of_flip.collect()
+    }
+
+    fn record(&mut self, record: &BranchRecord) -> bool {
+        self.records.keep(Line::Doubled(self.event, record.clone()))
     }
 }
 

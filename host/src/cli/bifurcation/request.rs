@@ -16,6 +16,8 @@ pub(super) struct Request {
     pub(super) range: [f64; 2],
     /// All parameters; that of `vary` has its first value.
     pub(super) setting: Setting,
+    /// True if the period-doubled orbits of flips are followed.
+    pub(super) doubled: bool,
     /// Values of the varied parameter at which cuts are simulated; empty without `--strobe`.
     pub(super) strobe: Vec<f64>,
     /// Curves in two parameters, if any.
@@ -105,6 +107,7 @@ impl Request {
             vary,
             range,
             setting,
+            doubled: args.doubled,
             strobe: if args.strobe {
                 args.range[0].values()
             } else {
@@ -124,6 +127,9 @@ impl Request {
         for parameter in Parameter::ALL.into_iter().filter(|other| *other != self.vary) {
             let value = self.setting.get(parameter).to_string();
             words.push((format!("--fix {}", parameter.key()), value));
+        }
+        if self.doubled {
+            words.push(("--doubled".to_owned(), "given".to_owned()));
         }
         if let Some(curves) = &self.curves {
             let kinds: Vec<&str> = curves.kinds.iter().map(|kind| word(*kind)).collect();

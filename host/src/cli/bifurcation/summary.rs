@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use super::answer::{end, first_loss, rotation};
 use super::computed::Computed;
+use super::doubled;
 use super::names::{criticality_word, word};
 use super::request::Request;
 use crate::orbit::curve::Curve;
@@ -51,6 +52,7 @@ pub(super) fn text(request: &Request, teeth: usize, computed: &Computed) -> Stri
             broken.reason, broken.try_instead
         );
     }
+    text.push_str(&doubled::text(request, computed));
     for curve in &computed.curves {
         text.push_str(&curve_text(curve));
     }

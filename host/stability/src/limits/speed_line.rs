@@ -51,8 +51,8 @@ pub struct SpeedLine {
     /// around the ends of the stable intervals.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub undecided_mm: Vec<[f64; 2]>,
-    /// Depths at this spindle speed with two stable forced orbits, mm, as intervals; only nonlinear structures have
-    /// them.
+    /// Bistable depths at this spindle speed, mm, as intervals: two forced orbits are stable, or a period-doubled one
+    /// beside the forced one, below a subcritical flip. Only nonlinear structures have them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bistable_mm: Vec<[f64; 2]>,
     /// Limit at which stability is first lost at this spindle speed; `None` if it is never lost up to the last depth,

@@ -3,7 +3,7 @@
 use quietcut_core::lobes::{Interval, IntervalKind, format::MAX_INTERVALS};
 use quietcut_core::units::{Hertz, Millimeters};
 
-use crate::limits::speed_line::SpeedLine;
+use crate::limits::speed_line::{SpeedLine, union};
 use crate::spectrum::stability_loss::StabilityLoss;
 
 /// Entry of a lobe table: an interval of unstable depths, with both ends in full precision.
@@ -14,8 +14,8 @@ pub(super) struct Entry {
     pub(super) to_mm: f64,
 }
 
-/// Depth intervals, mm, up to `depth_mm` that are stable with a single stable orbit. Where two stable orbits exist,
-/// stability depends on how the cut began.
+/// Depth intervals, mm, up to `depth_mm` that are stable whatever disturbs the cut: with a single stable vibration. Where
+/// two exist, stability depends on how the cut began, and on disturbances.
 pub(super) fn surely_stable(line: &SpeedLine, depth_mm: f64) -> Vec<[f64; 2]> {
     // Stable depths are cut at `depth_mm`, since a branch of forced orbits may extend one step beyond.
     let mut stable: Vec<[f64; 2]> = line
@@ -34,7 +34,7 @@ pub(super) fn surely_stable(line: &SpeedLine, depth_mm: f64) -> Vec<[f64; 2]> {
     stable
 }
 
-/// Entries for the depths up to `depth_mm` at one spindle speed that are unstable or have two stable orbits, ascending.
+/// Entries for the depths up to `depth_mm` at one spindle speed that are unstable or bistable, ascending.
 pub(super) fn unstable(line: &SpeedLine, depth_mm: f64) -> Vec<Entry> {
     let mut entries: Vec<Entry> = Vec::new();
     let mut from_mm = 0.0;
@@ -43,49 +43,90 @@ pub(super) fn unstable(line: &SpeedLine, depth_mm: f64) -> Vec<Entry> {
         .chain([[depth_mm, depth_mm]]);
     for [stable_from, stable_to] in ends {
         if stable_from > from_mm {
-            let switch = line.switches.iter().find(|switch| switch.depth_mm == from_mm);
-            // If a second stable orbit begins at a depth without a stability switch, the jump to that orbit counts as a
-            // fold.
-            let is_jump = line.bistable_mm.iter().any(|interval| interval[0] == from_mm);
-            let kind = match switch {
-                Some(switch) => table_kind(switch.kind),
-                None if is_jump => IntervalKind::Fold,
-                None => IntervalKind::Undecided,
-            };
-            entries.push(Entry {
-                interval: Interval {
-                    from: Millimeters(from_mm as f32),
-                    to: Millimeters(stable_from as f32),
-                    kind,
-                    chatter: Hertz(switch.and_then(|switch| switch.chatter_hz).unwrap_or(0.0) as f32),
-                },
-                from_mm,
-                to_mm: stable_from,
-            });
+            parts(line, [from_mm, stable_from], &mut entries);
         }
         from_mm = stable_to;
     }
     limited(entries)
 }
 
-/// Union of the unstable depths of `entries` and `others`, limited to the capacity of a column; where both overlap, the
-/// kind of stability loss is that of `entries`.
-pub(super) fn with_all_of(entries: &[Entry], others: &[Entry]) -> Vec<Entry> {
-    let mut all = entries.to_vec();
-    for other in others {
-        let mut from_mm = other.from_mm;
-        let behind = entries.iter().filter(|own| own.to_mm > other.from_mm);
-        for own in behind.take_while(|own| own.from_mm < other.to_mm) {
-            all.extend(other.part(from_mm, own.from_mm));
-            from_mm = own.to_mm;
+/// Appends the entries of a depth interval that is not surely stable: its bistable parts, and the unstable ones between
+/// them, with the kind of the stability loss at their start.
+fn parts(line: &SpeedLine, [from_mm, to_mm]: [f64; 2], entries: &mut Vec<Entry>) {
+    let mut from_mm = from_mm;
+    let switch_at = |depth_mm: f64| line.switches.iter().find(|switch| switch.depth_mm == depth_mm);
+    for [low, high] in union(line.bistable_mm.clone()) {
+        let (low, high) = (low.max(from_mm), high.min(to_mm));
+        if low >= high {
+            continue;
         }
-        all.extend(other.part(from_mm, other.to_mm));
+        if low > from_mm {
+            let switch = switch_at(from_mm);
+            let kind = switch.map_or(IntervalKind::Undecided, |switch| table_kind(switch.kind));
+            entries.push(Entry::new(
+                [from_mm, low],
+                kind,
+                switch.and_then(|switch| switch.chatter_hz),
+            ));
+        }
+        // The frequency of the second vibration is that of the loss at which the bistable interval ends.
+        let chatter_hz = switch_at(high).and_then(|switch| switch.chatter_hz);
+        entries.push(Entry::new([low, high], IntervalKind::Bistable, chatter_hz));
+        from_mm = high;
     }
-    all.sort_by(|a, b| a.from_mm.total_cmp(&b.from_mm));
+    if from_mm < to_mm {
+        let switch = switch_at(from_mm);
+        let kind = switch.map_or(IntervalKind::Undecided, |switch| table_kind(switch.kind));
+        entries.push(Entry::new(
+            [from_mm, to_mm],
+            kind,
+            switch.and_then(|switch| switch.chatter_hz),
+        ));
+    }
+}
+
+/// Union of the unstable and bistable depths of `entries` and `others`, limited to the capacity of a column. Where both
+/// overlap, unstable prevails over bistable, and otherwise the kind of `entries`.
+pub(super) fn with_all_of(entries: &[Entry], others: &[Entry]) -> Vec<Entry> {
+    let mut all: Vec<Entry> = Vec::new();
+    for is_bistable in [false, true] {
+        for added in [entries, others] {
+            let own = all.clone();
+            let of_kind = |entry: &&Entry| (entry.interval.kind == IntervalKind::Bistable) == is_bistable;
+            for entry in added.iter().filter(of_kind) {
+                fill(&mut all, &own, entry);
+            }
+            all.sort_by(|a, b| a.from_mm.total_cmp(&b.from_mm));
+        }
+    }
     limited(all)
 }
 
+/// Appends the parts of an entry that the ascending entries `own` leave free.
+fn fill(all: &mut Vec<Entry>, own: &[Entry], entry: &Entry) {
+    let mut from_mm = entry.from_mm;
+    let behind = own.iter().filter(|own| own.to_mm > entry.from_mm);
+    for own in behind.take_while(|own| own.from_mm < entry.to_mm) {
+        all.extend(entry.part(from_mm, own.from_mm));
+        from_mm = own.to_mm;
+    }
+    all.extend(entry.part(from_mm, entry.to_mm));
+}
+
 impl Entry {
+    pub(super) fn new([from_mm, to_mm]: [f64; 2], kind: IntervalKind, chatter_hz: Option<f64>) -> Self {
+        Self {
+            interval: Interval {
+                from: Millimeters(from_mm as f32),
+                to: Millimeters(to_mm as f32),
+                kind,
+                chatter: Hertz(chatter_hz.unwrap_or(0.0) as f32),
+            },
+            from_mm,
+            to_mm,
+        }
+    }
+
     /// This entry with other ends, mm; `None` unless the first lies below the second.
     fn part(&self, from_mm: f64, to_mm: f64) -> Option<Self> {
         (from_mm < to_mm).then_some(Self {
@@ -111,6 +152,10 @@ fn limited(mut entries: Vec<Entry>) -> Vec<Entry> {
         let upper = entries.remove(narrowest + 1);
         entries[narrowest].to_mm = upper.to_mm;
         entries[narrowest].interval.to = upper.interval.to;
+        // What is unstable in one part must not be called bistable.
+        if entries[narrowest].interval.kind == IntervalKind::Bistable {
+            entries[narrowest].interval.kind = upper.interval.kind;
+        }
     }
     entries
 }

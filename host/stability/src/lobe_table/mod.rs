@@ -18,4 +18,6 @@ pub use request::TableRequest;
 #[cfg(test)]
 mod accuracy_tests;
 #[cfg(test)]
+mod bistable_tests;
+#[cfg(test)]
 mod tests;

@@ -677,7 +677,10 @@ fn two_stable_orbits_are_not_surely_stable() {
     let entries = entries::unstable(&line, 4.0);
     assert_eq!(entries.len(), 1);
     assert_eq!((entries[0].from_mm, entries[0].to_mm), (2.0, 3.0));
-    assert_eq!(entries[0].interval.kind, quietcut_core::lobes::IntervalKind::Fold);
+    assert_eq!(
+        entries[0].interval.kind,
+        quietcut_core::lobes::IntervalKind::Bistable
+    );
 }
 
 #[test]

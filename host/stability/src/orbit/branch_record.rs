@@ -98,6 +98,11 @@ impl BranchRecord {
         })
     }
 
+    /// The orbit, of states of `order` components; `None` if the record does not fit.
+    pub(super) fn orbit(&self, order: usize) -> Option<Orbit> {
+        self.orbit.restored(order)
+    }
+
     /// Bifurcations on the step that led to this orbit; `None` if the record does not fit.
     pub(super) fn restored_events(&self, order: usize) -> Option<Vec<Event>> {
         self.events.iter().map(|event| event.restored(order)).collect()

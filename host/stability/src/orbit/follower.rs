@@ -168,6 +168,17 @@ impl<M: PeriodMap> Follower<M> {
         let here = self
             .sample(start, &towards)
             .map_err(|cause| BrokenBranch { cause, branch: None })?;
+        self.beyond(here, extent, journal)
+    }
+
+    /// Follows the branch from an orbit in the direction of its tangent, and on from the orbits that a journal has
+    /// recorded.
+    pub(super) fn beyond(
+        &self,
+        here: Sample,
+        extent: Extent,
+        journal: &mut dyn BranchJournal,
+    ) -> Result<Branch, BrokenBranch> {
         let mut branch = Branch {
             parameter: self.map.parameter(),
             rpm: self.rpm,
@@ -285,7 +296,11 @@ impl<M: PeriodMap> Follower<M> {
         let [low, high] = self.ends();
         let lost = extent == Extent::FirstLoss && branch.events.iter().any(|event| !event.gain);
         let value = last.orbit.value;
-        branch.points.len() > 1 && (lost || value >= high || value <= low)
+        let rejoined = last
+            .before
+            .as_ref()
+            .is_some_and(|before| self.map.has_rejoined(&before.orbit, &last.orbit));
+        branch.points.len() > 1 && (lost || rejoined || value >= high || value <= low)
     }
 
     /// Forced orbit with its multipliers one step further along the branch.

@@ -1,14 +1,19 @@
 //! Stability method of structures whose limits depend on the forced orbit, for charts and single cuts.
 
-use super::branch::Extent;
+use super::branch::{Branch, Event, Extent};
+use super::branch_record::Unrecorded;
 use super::branches::{follow_depth, multiplier_at};
+use super::criticality::criticality;
 use super::forced::ForcedProblem;
+use super::parameter::Parameter;
 use super::periodic_orbit::OrbitError;
+use super::subharmonic::follow_doubled;
 use crate::criteria::{LEAST_ERROR, ORBIT_ROOM};
 use crate::error::StabilityError;
 use crate::limits::method::Method;
 use crate::limits::point::CutStability;
 use crate::limits::speed_line::SpeedLine;
+use crate::spectrum::stability_loss::StabilityLoss;
 
 /// Floquet multipliers (characteristic multipliers) about the forced orbit at the feed of the case, followed from depth
 /// 0.
@@ -45,11 +50,36 @@ impl Method for ForcedProblem {
         ))
     }
 
-    /// Follows the branch of forced orbits with its own steps in depth; `samples` is not used.
+    /// Follows the branch of forced orbits with its own steps in depth, and the doubled orbits from its subcritical flips;
+    /// `samples` is not used.
     fn line(&self, rpm: f64, depth_mm: f64, _samples: usize) -> Result<SpeedLine, StabilityError> {
-        follow_depth(self, rpm, depth_mm, Extent::Whole)
-            .map(|branch| branch.speed_line())
-            .map_err(|cause| broke_down(rpm, depth_mm, cause))
+        let branch = follow_depth(self, rpm, depth_mm, Extent::Whole)
+            .map_err(|cause| broke_down(rpm, depth_mm, cause))?;
+        let mut line = branch.speed_line();
+        let below = self.bistable_below_flips(rpm, depth_mm, &branch);
+        line.bistable_mm.extend(below);
+        line.bistable_mm.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        Ok(line)
+    }
+}
+
+impl ForcedProblem {
+    /// Depth intervals, mm, below the subcritical flips of a branch over the depth, in which doubled orbits are stable
+    /// beside the forced ones. Of doubled orbits that cannot be followed to their end the known part counts.
+    fn bistable_below_flips(&self, rpm: f64, depth_mm: f64, branch: &Branch) -> Vec<[f64; 2]> {
+        let (setting, range) = (self.setting(rpm, 0.0), [0.0, depth_mm]);
+        let is_subcritical = |event: &&Event| {
+            event.kind == StabilityLoss::Flip
+                && criticality(self, setting, Parameter::Depth, range, event)
+                    .is_some_and(|criticality| !criticality.is_supercritical())
+        };
+        let doubled = branch.events.iter().filter(is_subcritical).filter_map(|event| {
+            match follow_doubled(self, setting, Parameter::Depth, range, event, &mut Unrecorded) {
+                Ok(doubled) => Some(doubled),
+                Err(broken) => broken.branch.map(|known| *known),
+            }
+        });
+        doubled.flat_map(|doubled| doubled.bistable(branch)).collect()
     }
 }
 

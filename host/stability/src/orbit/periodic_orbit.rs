@@ -201,6 +201,12 @@ pub(super) trait PeriodMap: Sized {
 
     /// The same map over the period on a finer mesh, for error estimates; `None` if there is no such mesh.
     fn finer(&self) -> Option<Self>;
+
+    /// True if a branch of orbits of several tooth periods passes an orbit of one tooth period between two of its orbits,
+    /// and ends there.
+    fn has_rejoined(&self, _from: &Orbit, _to: &Orbit) -> bool {
+        false
+    }
 }
 
 impl Orbit {
@@ -411,7 +417,7 @@ pub(super) struct Scale {
 
 impl Scale {
     /// Converts a change of the orbit's start and parameter from units of this scale to their own units.
-    fn unscaled(&self, step: &DVector<f64>) -> DVector<f64> {
+    pub(super) fn unscaled(&self, step: &DVector<f64>) -> DVector<f64> {
         let mut change = step * self.state;
         change[step.len() - 1] = step[step.len() - 1] * self.value;
         change

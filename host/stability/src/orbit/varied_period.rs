@@ -57,17 +57,23 @@ impl<'a> VariedPeriod<'a> {
         }
     }
 
+    /// Forced problem with the factors κ = ν = 1.
+    pub(super) fn base(&self) -> &'a ForcedProblem {
+        self.base
+    }
+
     /// Setting at a value of the parameter.
-    fn at(&self, value: f64) -> Setting {
+    pub(super) fn at(&self, value: f64) -> Setting {
         self.setting.at(self.parameter, value)
     }
 
     /// Forced problem at a setting.
-    fn problem_at(&self, setting: &Setting) -> ForcedProblem {
+    pub(super) fn problem_at(&self, setting: &Setting) -> ForcedProblem {
         self.base.at(setting)
     }
 
-    fn period<'b>(&self, problem: &'b ForcedProblem, setting: &Setting) -> ToothPeriod<'b> {
+    /// Tooth period of a problem at a setting.
+    pub(super) fn period<'b>(&self, problem: &'b ForcedProblem, setting: &Setting) -> ToothPeriod<'b> {
         ToothPeriod::on_mesh_of(self.slowest_rpm, problem, setting.rpm, self.subinterval_angle)
     }
 
