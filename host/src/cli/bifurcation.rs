@@ -7,6 +7,7 @@ mod computed;
 mod doubled;
 mod files;
 mod names;
+mod orbit_entry;
 mod records;
 mod request;
 mod strobe;

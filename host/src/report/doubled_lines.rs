@@ -5,7 +5,7 @@ use std::ops::Range;
 use plotters::prelude::Rectangle;
 use plotters::style::Color;
 
-use super::branch_chart::{Ordinate, Run, draw_runs, runs};
+use super::branch_lines::{Ordinate, Run, draw_runs, runs};
 use super::picture::{Axes, ORANGE, PictureError};
 use crate::orbit::{Branch, BranchPoint, DoubledBranch, Event};
 

@@ -3,6 +3,7 @@
 pub mod answer;
 pub mod backbone_chart;
 pub mod branch_chart;
+mod branch_lines;
 pub mod cell_map;
 pub mod comparison;
 pub mod curve_chart;

@@ -5,11 +5,12 @@ use serde_json::{Map, Value, json};
 
 use super::computed::{Broken, Computed};
 use super::doubled::doubled;
-use super::names::{criticality_word, word};
+use super::names::{criticality_word, unit, word};
+use super::orbit_entry::point;
 use super::request::Request;
 use super::strobe::StrobeSet;
 use crate::orbit::curve::{Curve, CurveEnd, CurvePoint, Resonance};
-use crate::orbit::{BranchPoint, Event, Parameter, Setting};
+use crate::orbit::{Event, Parameter, Setting};
 
 /// The answer.
 #[derive(Serialize)]
@@ -33,16 +34,6 @@ pub(super) struct BifurcationOutput<'a> {
     strobe: Vec<Map<String, Value>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     incomplete: Option<&'a Broken>,
-}
-
-/// Ending of keys for the unit of a parameter.
-pub(super) fn unit(parameter: Parameter) -> &'static str {
-    match parameter {
-        Parameter::Depth | Parameter::Feed => "mm",
-        Parameter::Rpm => "rpm",
-        Parameter::Kappa => "kappa",
-        Parameter::Nu => "nu",
-    }
 }
 
 /// Index of the event at which a branch that begins stable loses stability first.
@@ -118,16 +109,6 @@ impl<'a> BifurcationOutput<'a> {
             incomplete: computed.broken.as_ref(),
         }
     }
-}
-
-pub(super) fn point(vary: Parameter, at: &BranchPoint, directions: usize) -> Map<String, Value> {
-    let mut map = Map::new();
-    map.insert(vary.key().into(), json!(at.value));
-    map.insert("amplitude_mm".into(), json!(at.amplitude_mm[..directions]));
-    map.insert("displacement_mm".into(), json!(at.displacement_mm[..directions]));
-    map.insert("multiplier_abs".into(), json!(at.multiplier_abs));
-    map.insert("unstable_multipliers".into(), json!(at.outside));
-    map
 }
 
 fn event(

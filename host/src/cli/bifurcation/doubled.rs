@@ -4,9 +4,9 @@ use std::fmt::Write;
 
 use serde_json::{Map, Value, json};
 
-use super::answer::{point, unit};
 use super::computed::{Computed, Doubled};
-use super::names::word;
+use super::names::{unit, word};
+use super::orbit_entry::point;
 use super::request::Request;
 use crate::orbit::{Branch, DoubledBranch, Event, Parameter};
 use crate::report::digits::significant;

@@ -1,4 +1,4 @@
-//! Words of the kinds of bifurcation, and the values that a parameter can have.
+//! Words of the kinds of bifurcation, units, and the values that a parameter can have.
 
 use crate::case::SPEED_MAX_RPM;
 use crate::orbit::{Criticality, Parameter};
@@ -19,6 +19,16 @@ pub(super) fn criticality_word(criticality: Criticality) -> &'static str {
         "supercritical"
     } else {
         "subcritical"
+    }
+}
+
+/// Ending of keys for the unit of a parameter.
+pub(super) fn unit(parameter: Parameter) -> &'static str {
+    match parameter {
+        Parameter::Depth | Parameter::Feed => "mm",
+        Parameter::Rpm => "rpm",
+        Parameter::Kappa => "kappa",
+        Parameter::Nu => "nu",
     }
 }
 
