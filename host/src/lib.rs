@@ -63,4 +63,5 @@ mod criteria;
 pub mod demo;
 pub mod device;
 pub mod machine;
+mod monitor;
 pub mod report;

@@ -1,5 +1,7 @@
-//! `quietcut monitor`: live verdicts and advice of the device.
+//! `quietcut monitor`: live verdicts and advice of the device, as a picture on a terminal and as lines elsewhere.
 
+use std::io::IsTerminal;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -9,10 +11,16 @@ use quietcut_core::protocol::{Reports, Subscription};
 use super::port::PortArgs;
 use super::{Error, StreamedOutput, positive};
 use crate::device::{Client, Event};
+use crate::monitor::screen::{self, ScreenError};
 use crate::report::answer::VerdictLog;
 use crate::report::words;
 
 /// Shows live reports of the device: spindle speed, verdict, chatter frequency, advice.
+///
+/// On a terminal it draws verdict and speed in large letters, the spectrum, the stroboscopic map, the lobes of --table
+/// and a history, and waits for a pulled cable to be plugged in again. It prints lines instead if standard input or
+/// output is no terminal, with --lines, --seconds, --json or --json-lines, and on a terminal that cannot place text
+/// (TERM=dumb). It draws without colours if NO_COLOR is set.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  quietcut monitor simulated --seconds 2")]
 pub struct Args {
@@ -21,8 +29,24 @@ pub struct Args {
     /// Stop after this time in s. Default: run until Ctrl-C.
     #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]
     seconds: Option<f64>,
+    /// Lobe table for the lobe chart and the margin on a terminal.
+    #[arg(long, value_name = "FILE.qct")]
+    table: Option<PathBuf>,
+    /// Print lines on a terminal too.
+    #[arg(long)]
+    lines: bool,
     #[command(flatten)]
     output: StreamedOutput,
+}
+
+impl Args {
+    /// True if the state of the device is drawn; false if it is printed as lines.
+    fn draws(&self) -> bool {
+        let is_asked_for_lines = self.lines || self.seconds.is_some() || self.output.is_json();
+        let can_place_text = std::env::var_os("TERM").is_some_and(|name| name != "dumb" && !name.is_empty());
+        let (input, output) = (std::io::stdin(), std::io::stdout());
+        !is_asked_for_lines && can_place_text && input.is_terminal() && output.is_terminal()
+    }
 }
 
 /// Least time between two printed lines while verdict and advice of the device do not change: a choice, short enough to
@@ -38,6 +62,9 @@ pub fn run(args: Args) -> Result<(), Error> {
     let on_interrupt = stop.clone();
     ctrlc::set_handler(move || on_interrupt.store(true, Ordering::Relaxed)).map_err(Error::other)?;
 
+    if args.draws() {
+        return draw(&args, &stop);
+    }
     let (mut client, _) = args.port.connect()?;
     client.subscribe(Subscription {
         reports: Reports::All,
@@ -51,13 +78,30 @@ pub fn run(args: Args) -> Result<(), Error> {
         stop.load(Ordering::Relaxed) || end.is_some_and(|end| Instant::now() >= end)
     })?;
     client.subscribe(Subscription::default())?;
-    if client.lost_frames() > 0 {
-        tracing::warn!(
-            "{} messages of the device were lost on the serial line",
-            client.lost_frames()
-        );
-    }
+    warn_of_lost(client.lost_frames());
     args.output.end(&[], &log, &log.summary)
+}
+
+/// Draws the state of the device until the user quits, then prints the summary.
+fn draw(args: &Args, stop: &Arc<AtomicBool>) -> Result<(), Error> {
+    let connect = args.port.connector()?;
+    let table = args.table.as_deref().map(crate::file::read).transpose()?;
+    let outcome = screen::show(args.port.name(), connect, table, stop).map_err(|error| match error {
+        ScreenError::Device(cause) => cause.into(),
+        ScreenError::Table(cause) => Error::input(format!(
+            "{}: {cause}",
+            args.table.as_deref().unwrap_or("--table".as_ref()).display()
+        )),
+        other => Error::other(other),
+    })?;
+    warn_of_lost(outcome.lost_frames);
+    args.output.end(&[], &outcome.log, &outcome.log.summary)
+}
+
+fn warn_of_lost(frames: u32) {
+    if frames > 0 {
+        tracing::warn!("{frames} messages of the device were lost on the serial line");
+    }
 }
 
 /// Until `is_over` returns true, prints each report of the device that [`VerdictLog::take`] finds changed, and the

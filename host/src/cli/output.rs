@@ -119,6 +119,11 @@ pub struct StreamedOutput {
 }
 
 impl StreamedOutput {
+    /// True with `--json` or `--json-lines`.
+    pub(super) fn is_json(self) -> bool {
+        self.output.is_json() || self.json_lines
+    }
+
     /// Prints one event, such as a change of the verdict: the JSON of `object` with `--json-lines`, nothing with
     /// `--json`, else `text`.
     pub fn event(self, object: &impl Serialize, text: impl Display) -> Result<(), Error> {

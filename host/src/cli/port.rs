@@ -7,7 +7,7 @@ use quietcut_core::working_point::WorkingPoint;
 use serde::Serialize;
 
 use super::Error;
-use crate::device::{self, Client};
+use crate::device::{self, Client, DeviceError};
 use crate::report::answer::number;
 
 /// Port of the device, and state file of the simulated device: options of `upload`, `info`, `working-point` and
@@ -35,6 +35,13 @@ impl PortArgs {
 
     /// Opens the port and starts the protocol with the device.
     pub fn connect(&self) -> Result<(Client, Info), Error> {
+        Ok(self.connector()?()?)
+    }
+
+    /// Function that opens the port and starts the protocol with the device, each time that it is called.
+    pub(super) fn connector(
+        &self,
+    ) -> Result<impl FnMut() -> Result<(Client, Info), DeviceError> + Send + use<>, Error> {
         if let Some(state) = &self.state
             && self.port != device::port::SIMULATED
         {
@@ -44,8 +51,8 @@ impl PortArgs {
                 self.port
             )));
         }
-        let port = device::open(&self.port, self.state.as_deref())?;
-        Ok(Client::connect(port)?)
+        let (port, state) = (self.port.clone(), self.state.clone());
+        Ok(move || Client::connect(device::open(&port, state.as_deref())?))
     }
 }
 

@@ -1,0 +1,212 @@
+//! The upper part: port, verdict and speed in large letters, advice, margin, strip of verdicts.
+
+use quietcut_core::detector::Verdict;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::Style;
+
+use super::letters::{self, Size};
+use super::palette::Palette;
+use super::put;
+use crate::monitor::heard::{Connection, Heard, STRIP_S};
+use crate::report::words;
+
+/// Rows of a terminal from which margin and strip of verdicts are shown: a choice.
+const ROWS_OF_ALL: u16 = 20;
+
+/// Columns between the large verdict and the large speed: a choice.
+const GAP: u16 = 4;
+
+/// Draws the upper part; returns the number of rows that it takes.
+pub(super) fn draw(heard: &Heard, frozen: bool, palette: Palette, area: Rect, buffer: &mut Buffer) -> u16 {
+    put(area, 0, &title(heard, frozen), palette.title(), buffer);
+    let below = |rows: u16| Rect {
+        y: area.y + rows,
+        height: area.height.saturating_sub(rows),
+        ..area
+    };
+    let mut used = 1 + draw_large(heard, palette, below(1), area.height, buffer);
+    let mut line = |text: &str, style: Style| {
+        put(area, used, text, style, buffer);
+        used += 1;
+    };
+    line(&sentence(heard), palette.verdict(verdict(heard)));
+    line(&advice(heard), Style::new());
+    if area.height >= ROWS_OF_ALL {
+        line(&reason(heard), palette.faint());
+        line(&margin(heard), Style::new());
+        draw_strip(heard, palette, below(used), buffer);
+        used += 1;
+    }
+    used
+}
+
+/// Draws what a terminal too small for the view has room for.
+pub(super) fn draw_small(
+    heard: &Heard,
+    least: (u16, u16),
+    palette: Palette,
+    area: Rect,
+    buffer: &mut Buffer,
+) {
+    let style = palette.verdict(verdict(heard));
+    put(
+        area,
+        0,
+        &format!("{} {}", word(heard), speed(heard)),
+        style,
+        buffer,
+    );
+    put(area, 1, &sentence(heard), Style::new(), buffer);
+    put(area, 2, &advice(heard), Style::new(), buffer);
+    let hint = format!("needs {} x {}; q quits", least.0, least.1);
+    put(
+        area,
+        area.height.saturating_sub(1).max(3),
+        &hint,
+        palette.faint(),
+        buffer,
+    );
+}
+
+fn title(heard: &Heard, frozen: bool) -> String {
+    let state = match &heard.connection {
+        Connection::Connecting => "connecting".into(),
+        Connection::Up if heard.report.is_none() => "connected, no report yet".into(),
+        Connection::Up => "live".into(),
+        Connection::Gone(_) => format!("CABLE PULLED, WAITING FOR {}", heard.port),
+    };
+    let device = heard.identity.as_ref().map(|identity| {
+        let table = identity.table.as_deref().unwrap_or("no table");
+        format!("  {}, {} teeth, {table}", identity.name, identity.teeth)
+    });
+    let frozen = if frozen { "FROZEN (Space goes on)  " } else { "" };
+    format!(
+        "{frozen}quietcut {}: {state}{}",
+        heard.port,
+        device.unwrap_or_default()
+    )
+}
+
+fn verdict(heard: &Heard) -> Option<Verdict> {
+    Some(heard.report?.judgement.verdict)
+}
+
+/// Verdict in one word for the large letters.
+fn word(heard: &Heard) -> &'static str {
+    match (&heard.connection, verdict(heard)) {
+        (Connection::Gone(_), _) => "GONE",
+        (_, None) => "?",
+        (_, Some(verdict)) => match verdict {
+            Verdict::AirCut => "IN AIR",
+            Verdict::Stable => "QUIET",
+            Verdict::Hopf | Verdict::PeriodDoubling => "CHATTER",
+            Verdict::Forced => "FORCED",
+            Verdict::Runout => "RUNOUT",
+            Verdict::Indeterminate => "UNSURE",
+        },
+    }
+}
+
+fn speed(heard: &Heard) -> String {
+    heard.rpm().map_or_else(|| "?".into(), |rpm| format!("{rpm:.0}"))
+}
+
+/// Draws verdict and speed in large letters; returns the number of rows.
+fn draw_large(heard: &Heard, palette: Palette, area: Rect, rows: u16, buffer: &mut Buffer) -> u16 {
+    const UNIT: &str = "rev/min";
+    let (word, speed) = (word(heard), speed(heard));
+    // The size is that of the longest verdict, so that the picture does not jump when the verdict changes.
+    let widest = format!("CHATTER {}", if speed.len() > 5 { "000000" } else { "00000" });
+    let room = area.width.saturating_sub(UNIT.len() as u16 + GAP + 1);
+    let size = Size::fitting(&widest, room, rows);
+    let style = palette.verdict(verdict(heard));
+    letters::draw(word, size, style, area, buffer);
+    let from = size.columns("CHATTER") + GAP;
+    let right = Rect {
+        x: area.x + from.min(area.width),
+        width: area.width.saturating_sub(from),
+        ..area
+    };
+    letters::draw(&speed, size, Style::new(), right, buffer);
+    let behind = size.columns(&speed) + 1;
+    let unit = Rect {
+        x: right.x + behind.min(right.width),
+        width: right.width.saturating_sub(behind),
+        ..right
+    };
+    put(unit, size.rows() - 1, UNIT, palette.faint(), buffer);
+    size.rows()
+}
+
+fn sentence(heard: &Heard) -> String {
+    match (&heard.connection, &heard.report) {
+        (Connection::Gone(reason), _) => format!("waiting for {}: {reason}", heard.port),
+        (_, Some(report)) => words::verdict(&report.judgement),
+        (Connection::Connecting, None) => format!("connecting to {}", heard.port),
+        (Connection::Up, None) => "the device is connected and has sent no report yet".into(),
+    }
+}
+
+fn advice(heard: &Heard) -> String {
+    match heard.report.and_then(|report| report.advice) {
+        Some(advice) => format!("advice: {}", words::action(&advice)),
+        None => "advice: none".into(),
+    }
+}
+
+fn reason(heard: &Heard) -> String {
+    let why = heard.report.and_then(|report| {
+        let advice = report.advice?;
+        Some(words::why(&advice, &report.judgement, report.speed))
+    });
+    why.map_or_else(String::new, |why| format!("        {why}"))
+}
+
+fn margin(heard: &Heard) -> String {
+    let counts = heard.report.map_or_else(String::new, |report| {
+        format!("; {} samples clipped, {} lost", report.clipped, report.lost)
+    });
+    let margin = match (&heard.lobes, heard.rpm()) {
+        (None, _) => "not known without --table FILE.qct".into(),
+        (_, None) => "not known without a speed".into(),
+        (Some(lobes), Some(rpm)) => lobes.margin(rpm).to_string(),
+    };
+    format!("margin: {margin}{counts}")
+}
+
+/// Letter of a verdict in the strip.
+fn letter(verdict: Option<Verdict>) -> char {
+    match verdict {
+        Some(Verdict::AirCut) => '.',
+        Some(Verdict::Stable) => 'q',
+        Some(Verdict::Hopf) => 'H',
+        Some(Verdict::PeriodDoubling) => 'D',
+        Some(Verdict::Forced) => 'F',
+        Some(Verdict::Runout) => 'R',
+        Some(Verdict::Indeterminate) => '?',
+        None => '|',
+    }
+}
+
+/// The verdicts of the last time as letters, the newest at the right.
+fn draw_strip(heard: &Heard, palette: Palette, area: Rect, buffer: &mut Buffer) {
+    let head = "verdicts ";
+    put(area, 0, head, palette.faint(), buffer);
+    let legend = format!(" now  1 = {STRIP_S} s  .air q quiet H Hopf D doubling");
+    let room = area.width.saturating_sub((head.len() + legend.len()) as u16);
+    let cells = heard.strip.iter().rev().take(usize::from(room));
+    let right = area.x + head.len() as u16 + room;
+    for (back, verdict) in (1..).zip(cells) {
+        if let Some(cell) = buffer.cell_mut((right.saturating_sub(back), area.y)) {
+            cell.set_char(letter(*verdict))
+                .set_style(palette.verdict(*verdict));
+        }
+    }
+    let behind = Rect {
+        x: right.min(area.right()),
+        width: area.right().saturating_sub(right),
+        ..area
+    };
+    put(behind, 0, &legend, palette.faint(), buffer);
+}
