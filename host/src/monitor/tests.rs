@@ -101,6 +101,8 @@ fn each_size_says_verdict_speed_and_keys() {
             assert!(text.contains(needed), "{size:?}: {needed} is missing in\n{text}");
         }
     }
+    let narrow = picture(&heard, &Choices::default(), (40, 12)).join("\n");
+    assert!(narrow.contains("1045"), "the speed is cut off in\n{narrow}");
     let text = picture(&heard, &Choices::default(), (20, 5)).join("\n");
     assert!(
         text.contains("CHATTER 1045") && text.contains("needs 40 x 12"),

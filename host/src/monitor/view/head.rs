@@ -128,6 +128,12 @@ fn draw_large(heard: &Heard, palette: Palette, area: Rect, rows: u16, buffer: &m
         width: area.width.saturating_sub(from),
         ..area
     };
+    if size.columns(&speed) > right.width {
+        // A number that is cut off is another number.
+        put(right, 0, &speed, palette.title(), buffer);
+        put(right, 1, UNIT, palette.faint(), buffer);
+        return size.rows();
+    }
     letters::draw(&speed, size, Style::new(), right, buffer);
     let behind = size.columns(&speed) + 1;
     let unit = Rect {

@@ -55,18 +55,22 @@ pub(super) fn width(text: &str) -> u16 {
 pub(super) enum Size {
     /// A dot is half a cell high and one cell wide: letters of three rows.
     Half,
-    /// A dot is this number of cells high and twice as many wide.
-    Whole(u16),
+    /// A dot is this number of cells high and wide.
+    Whole { rows: u16, columns: u16 },
 }
 
 impl Size {
-    /// Largest size whose letters of `text` fit into the width, at least an eighth of a screen with `rows` rows high.
+    /// Size of letters that take at least an eighth of a screen with `rows` rows; their dots are as wide as `text` in
+    /// `columns` columns allows, at most twice as wide as high, since a cell is about twice as high as wide.
     pub(super) fn fitting(text: &str, columns: u16, rows: u16) -> Self {
-        let scale = (rows / 8 / DOTS).min(columns / (2 * width(text)).max(1));
-        if scale == 0 {
-            Self::Half
-        } else {
-            Self::Whole(scale)
+        let least = rows.div_ceil(8);
+        if least <= Self::Half.rows() {
+            return Self::Half;
+        }
+        let rows = least.div_ceil(DOTS);
+        Self::Whole {
+            rows,
+            columns: (columns / width(text).max(1)).clamp(1, 2 * rows),
         }
     }
 
@@ -74,7 +78,7 @@ impl Size {
     pub(super) fn rows(self) -> u16 {
         match self {
             Self::Half => DOTS.div_ceil(2),
-            Self::Whole(scale) => DOTS * scale,
+            Self::Whole { rows, .. } => DOTS * rows,
         }
     }
 
@@ -82,7 +86,7 @@ impl Size {
     pub(super) fn columns(self, text: &str) -> u16 {
         match self {
             Self::Half => width(text),
-            Self::Whole(scale) => 2 * scale * width(text),
+            Self::Whole { columns, .. } => columns * width(text),
         }
     }
 }
@@ -103,7 +107,7 @@ pub(super) fn draw(text: &str, size: Size, style: Style, area: Rect, buffer: &mu
     for y in 0..size.rows().min(area.height) {
         for x in 0..size.columns(text).min(area.width) {
             let symbol = match size {
-                Size::Whole(scale) => [" ", "█"][usize::from(is_on(x / (2 * scale), y / scale))],
+                Size::Whole { rows, columns } => [" ", "█"][usize::from(is_on(x / columns, y / rows))],
                 Size::Half => match (is_on(x, 2 * y), is_on(x, 2 * y + 1)) {
                     (true, true) => "█",
                     (true, false) => "▀",
