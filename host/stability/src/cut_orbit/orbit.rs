@@ -289,6 +289,7 @@ impl Start {
         let not_periodic = CutOrbitError::NoPeriodicResponse { rpm };
         let (mut last, mut share) = (f64::INFINITY, 1.0);
         let (mut least, mut since) = (f64::INFINITY, 0);
+        let mut linearized = None;
         for _ in 0..STEPS {
             *steps += 1;
             let step = newton::step(model, ports, &self.mesh, &self.motion, share)
@@ -315,6 +316,8 @@ impl Start {
             self.motion = step.motion;
             if alike && moved < CONVERGED && events_moved < EVENT_FOUND {
                 last = full;
+                // About a motion that is this one but for [`CONVERGED`].
+                linearized = Some(step.linearized);
                 break;
             }
             if !alike || events_moved > 0.0 {
@@ -340,21 +343,31 @@ impl Start {
         if last > RESOLVABLE {
             return Err(CutOrbitError::not_converged(model, *steps, last));
         }
-        let orbit = self.orbit(model, ports, *steps).ok_or(not_periodic)?;
+        let orbit = self.orbit(model, ports, *steps, linearized).ok_or(not_periodic)?;
         Ok(Settled { orbit, change: last })
     }
 
-    fn orbit(&self, model: &CutModel, ports: &Ports, steps: usize) -> Option<CutOrbit> {
+    /// The orbit of the motion, with its equations if they are known.
+    fn orbit(
+        &self,
+        model: &CutModel,
+        ports: &Ports,
+        steps: usize,
+        linearized: Option<Linearization>,
+    ) -> Option<CutOrbit> {
         let period = Period {
             model,
             ports,
             mesh: &self.mesh,
             motion: &self.motion,
         };
-        let response = Response::new(&self.mesh, ports)?;
+        let linearized = match linearized {
+            Some(linearized) => linearized,
+            None => period.linearized(&Response::new(&self.mesh, ports)?)?,
+        };
         Some(CutOrbit {
             forces: period.forces(),
-            linearized: period.linearized(&response)?,
+            linearized,
             ports: ports.clone(),
             mesh: self.mesh.clone(),
             motion: self.motion.clone(),
