@@ -142,7 +142,7 @@ fn a_refused_upload_leaves_the_table_in_use() {
         capacity: 7 * 256,
     };
     assert_eq!(storage.begin(too_long), Err(refusal));
-    let schema = TableError::Schema { found: 9, known: 2 };
+    let schema = TableError::Schema { found: 9, known: 3 };
     assert_eq!(
         storage.begin(Header { schema: 9, ..header }),
         Err(Refusal::Table(schema))
