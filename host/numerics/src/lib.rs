@@ -45,6 +45,7 @@ pub mod newton;
 pub mod quadrature;
 pub mod roots;
 pub mod singular_values;
+pub mod spherical_bessel;
 pub mod statistics;
 mod stop;
 

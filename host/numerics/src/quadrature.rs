@@ -4,6 +4,9 @@ use std::f64::consts::PI;
 use std::sync::OnceLock;
 
 use nalgebra::DMatrix;
+use num_complex::Complex64;
+
+use crate::spherical_bessel::spherical_bessel;
 
 /// Gauss–Legendre rule: m nodes c in (0, 1), their weights b, and the integrals S_ij = ∫₀^{c_i} ℓ_j of the Lagrange
 /// polynomials ℓ_j of the nodes.
@@ -71,6 +74,47 @@ impl Gauss {
     }
 }
 
+impl Gauss {
+    /// ∫₀¹ ℓ_j(x) e^{−ikκx} dx of the Lagrange polynomials ℓ_j, for κ ≥ 0 and k = 0, 1, …; `orders` × m.
+    ///
+    /// With ℓ_j(x) = Σ_n (2n + 1) b_j P_n(2c_j − 1) P_n(2x − 1) and the plane wave in spherical Bessel functions,
+    /// ∫₀¹ P_n(2x − 1) e^{−iωx} dx = e^{−iω/2} (−i)ⁿ j_n(ω/2) (Abramowitz & Stegun 10.1.14).
+    pub fn fourier(&self, kappa: f64, orders: usize) -> DMatrix<Complex64> {
+        let count = self.nodes.len();
+        // (2n + 1) b_j P_n(2c_j − 1), node by node.
+        let expansion: Vec<f64> = self
+            .nodes
+            .iter()
+            .zip(&self.weights)
+            .flat_map(|(node, weight)| {
+                let values = legendre(count.max(1), 2.0 * node - 1.0);
+                (0..count).map(move |n| (2 * n + 1) as f64 * weight * values[n])
+            })
+            .collect();
+        let mut found = DMatrix::zeros(orders, count);
+        let mut bessel = vec![0.0; count];
+        for order in 0..orders {
+            let half = 0.5 * kappa * order as f64;
+            spherical_bessel(half, &mut bessel);
+            let turn = Complex64::cis(-half);
+            for (node, expansion) in expansion.chunks_exact(count).enumerate() {
+                // (−i)ⁿ is 1, −i, −1, i.
+                let mut parts = [0.0; 2];
+                for (n, (factor, value)) in expansion.iter().zip(&bessel).enumerate() {
+                    let signed = if n % 4 < 2 {
+                        factor * value
+                    } else {
+                        -factor * value
+                    };
+                    parts[n % 2] += signed;
+                }
+                found[(order, node)] = turn * Complex64::new(parts[0], -parts[1]);
+            }
+        }
+        found
+    }
+}
+
 /// Legendre polynomials P_0 … P_{count} at x, for `count` ≥ 1.
 fn legendre(count: usize, x: f64) -> Vec<f64> {
     let mut values = vec![1.0, x];
@@ -99,6 +143,28 @@ fn root(count: usize, i: usize) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn fourier_integrals_are_those_of_a_finer_rule() {
+        let (coarse, fine) = (Gauss::shared(8), Gauss::shared(40));
+        for kappa in [0.0, 1e-6, 0.01, 0.7] {
+            let found = coarse.fourier(kappa, 100);
+            for order in 0..100 {
+                for node in 0..8 {
+                    let exact: Complex64 = fine
+                        .nodes
+                        .iter()
+                        .zip(&fine.weights)
+                        .map(|(x, weight)| {
+                            weight * coarse.lagrange(*x)[node] * Complex64::cis(-kappa * order as f64 * x)
+                        })
+                        .sum();
+                    let error = (found[(order, node)] - exact).norm();
+                    assert!(error < 1e-14, "{kappa} {order} {node}: {error:e}");
+                }
+            }
+        }
+    }
 
     #[test]
     fn powers_are_integrated_exactly() {

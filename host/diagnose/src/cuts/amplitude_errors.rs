@@ -30,8 +30,9 @@ pub(crate) struct AmplitudeErrors {
     trend_whiteners: Vec<DMatrix<Complex64>>,
     /// Directions of the amplitudes of the record.
     directions: Vec<DMatrix<Complex64>>,
-    /// U, and S².
+    /// U, Uᵀ, and S².
     principal: DMatrix<f64>,
+    principal_transposed: DMatrix<f64>,
     squares: DVector<f64>,
     /// Z, of the directions of the amplitudes.
     turned: DMatrix<f64>,
@@ -56,6 +57,7 @@ impl AmplitudeErrors {
             trend_whiteners,
             directions,
             principal: DMatrix::zeros(0, 0),
+            principal_transposed: DMatrix::zeros(0, 0),
             squares: DVector::zeros(0),
             turned: DMatrix::zeros(0, 0),
             channels: orders.channels.len(),
@@ -82,6 +84,7 @@ impl AmplitudeErrors {
         for (mut column, square) in errors.principal.column_iter_mut().zip(&errors.squares) {
             column /= square.sqrt();
         }
+        errors.principal_transposed = errors.principal.transpose();
         errors.turned = turned.rows(0, count).into_owned();
         Some(errors)
     }
@@ -99,13 +102,18 @@ impl AmplitudeErrors {
         amplitudes: &DMatrix<Complex64>,
         trend: Option<&DMatrix<Complex64>>,
     ) -> Vec<f64> {
-        let mut values = DVector::from_vec(self.independent(amplitudes, trend));
-        let mut along = self.principal.tr_mul(&values);
-        for (along, square) in along.iter_mut().zip(&self.squares) {
-            *along *= 1.0 - (1.0 + square).sqrt().recip();
-        }
-        values.gemv(-1.0, &self.principal, &along, 1.0);
+        let mut values = DMatrix::from_vec(self.count(), 1, self.independent(amplitudes, trend));
+        self.decorrelate(&mut values);
         values.data.into()
+    }
+
+    /// Multiplies columns of independent values by (I + V Vᵀ)^(−1/2).
+    pub(super) fn decorrelate(&self, columns: &mut DMatrix<f64>) {
+        let mut along = &self.principal_transposed * &*columns;
+        for (mut along, square) in along.row_iter_mut().zip(&self.squares) {
+            along *= 1.0 - (1.0 + square).sqrt().recip();
+        }
+        columns.gemm(-1.0, &self.principal, &along, 1.0);
     }
 
     /// An error of the amplitudes and their trend without what most probably is common to the orders.
@@ -115,7 +123,7 @@ impl AmplitudeErrors {
         trend: Option<&DMatrix<Complex64>>,
     ) -> DMatrix<Complex64> {
         let values = DVector::from_vec(self.independent(error, trend));
-        let mut along = self.principal.tr_mul(&values);
+        let mut along = &self.principal_transposed * &values;
         for (along, square) in along.iter_mut().zip(&self.squares) {
             *along *= square.sqrt() / (1.0 + square);
         }
@@ -144,7 +152,11 @@ impl AmplitudeErrors {
     }
 
     /// Values whose errors are independent with unit variance but for what is common.
-    fn independent(&self, amplitudes: &DMatrix<Complex64>, trend: Option<&DMatrix<Complex64>>) -> Vec<f64> {
+    pub(super) fn independent(
+        &self,
+        amplitudes: &DMatrix<Complex64>,
+        trend: Option<&DMatrix<Complex64>>,
+    ) -> Vec<f64> {
         let mut values = of_orders(&self.whiteners, amplitudes);
         match trend {
             Some(trend) => values.extend(of_orders(&self.trend_whiteners, trend)),

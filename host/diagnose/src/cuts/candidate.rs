@@ -5,6 +5,7 @@ use std::sync::Arc;
 use toml::Table;
 
 use crate::candidates::cause::Location;
+use quietcut_model::case::Case;
 use quietcut_model::effects::EffectName;
 
 /// Range of a coordinate.
@@ -31,6 +32,9 @@ impl Coordinate {
 /// Parameters of an effect, by key, at coordinates.
 pub(crate) type Parameters = Arc<dyn Fn(&[f64]) -> Vec<(&'static str, f64)> + Send + Sync>;
 
+/// Coordinates of an effect that changes nothing in a case.
+type Unchanged = Arc<dyn Fn(&Case) -> Option<Vec<f64>> + Send + Sync>;
+
 /// A form of an effect at a place, with coordinates that are standard normal before the records are seen.
 #[derive(Clone)]
 pub(crate) struct Candidate {
@@ -41,9 +45,9 @@ pub(crate) struct Candidate {
     pub grid: Vec<Vec<f64>>,
     /// True if the effect is absent where the first coordinate is zero.
     pub vanishes: bool,
-    /// True if the effect has an internal state that follows the motion: where it vanishes it has no orbit of its own.
-    pub has_state: bool,
     parameters: Parameters,
+    /// Where the effect sets a parameter that the case has: its coordinates at the value of a case.
+    unchanged: Option<Unchanged>,
 }
 
 impl Candidate {
@@ -59,9 +63,18 @@ impl Candidate {
             coordinates,
             grid: Vec::new(),
             vanishes: false,
-            has_state: false,
             parameters: Arc::new(parameters),
+            unchanged: None,
         }
+    }
+
+    /// This candidate, which sets parameters that cases have: `unchanged` are its coordinates at the values of a case.
+    pub(crate) fn setting(
+        mut self,
+        unchanged: impl Fn(&Case) -> Option<Vec<f64>> + Send + Sync + 'static,
+    ) -> Self {
+        self.unchanged = Some(Arc::new(unchanged));
+        self
     }
 
     /// This candidate for each channel of its place by itself, as an answer lists it.
@@ -83,10 +96,10 @@ impl Candidate {
         self
     }
 
-    /// This candidate with an internal state.
-    pub(crate) fn with_state(mut self) -> Self {
-        self.has_state = true;
-        self
+    /// True if its first coordinate is the size of an effect whose shape the others tell, and is compared with the records where
+    /// the effect is faint: an internal state has no orbit without it, and shapes come from a grid.
+    pub(crate) fn is_faint_at_start(&self) -> bool {
+        self.vanishes && self.coordinates.len() > 1 && !self.grid.is_empty()
     }
 
     /// This candidate with further starts.
@@ -127,17 +140,17 @@ impl Candidate {
         Some(table)
     }
 
-    /// Coordinates at which the records are compared to first order.
-    pub(crate) fn starts(&self) -> Vec<Vec<f64>> {
-        let first = self
-            .coordinates
-            .iter()
-            .map(|coordinate| coordinate.start)
-            .collect();
-        if self.grid.is_empty() {
-            vec![first]
-        } else {
-            self.grid.clone()
+    /// Coordinates at which the records are compared to first order, for a baseline that has become `case`: an effect that sets a
+    /// parameter begins at the value that this has there.
+    pub(crate) fn starts(&self, case: &Case) -> Vec<Vec<f64>> {
+        if !self.grid.is_empty() {
+            return self.grid.clone();
         }
+        let unchanged = self.unchanged.as_ref().and_then(|unchanged| unchanged(case));
+        let first = || {
+            let starts = self.coordinates.iter().map(|coordinate| coordinate.start);
+            starts.collect()
+        };
+        vec![unchanged.unwrap_or_else(first)]
     }
 }

@@ -8,11 +8,13 @@ use super::candidate::{Candidate, Coordinate};
 use super::fit::Fit;
 use super::record::ReducedCut;
 use super::restoring_candidates::{
-    Along, DAMPING_RATIO, of_axis, of_coupling, of_missing_mode, of_restoring_force,
+    Along, DAMPING_RATIO, FAINT, of_axis, of_coupling, of_missing_mode, of_restoring_force,
 };
 use crate::baseline::{Baseline, pickup_of};
 use crate::candidates::cause::Location;
+use quietcut_model::case::Case;
 use quietcut_model::effects::EffectName;
+use quietcut_model::milling::Tool;
 use quietcut_model::structure::Form;
 use quietcut_recording::Quantity;
 
@@ -27,6 +29,8 @@ const RUNOUT_UM: f64 = 10.0;
 /// Growth of the forces by wear, and change of the stiffness by heat and posture, over a record.
 const WEAR: f64 = 0.2;
 const DRIFT: f64 = 0.1;
+/// Friction coefficient of the flank of a tooth (dry steel and carbide: 0.2 to 0.5).
+const FLANK_FRICTION: f64 = 0.3;
 /// Error of the gain of a sensor.
 const GAIN: f64 = 0.1;
 /// Delay of a channel, in samples.
@@ -69,10 +73,12 @@ fn of_linear_structure(baseline: &Baseline<'_>, along: &[Along], all: &mut Vec<C
     for (effect, key) in effects {
         for place in &places {
             let of = |z: &[f64]| vec![("relative_change", (PARAMETER * z[0]).exp() - 1.0)];
-            let candidate = match entry(baseline, effect, place) {
-                Some(entry) if entry > 0.0 => {
-                    let of = move |z: &[f64]| vec![(key, entry * (PARAMETER * z[0]).exp())];
-                    Candidate::new(effect, place.clone(), vec![Coordinate::FREE], of)
+            let candidate = match entry(baseline.case, effect, place) {
+                Some(known) if known > 0.0 => {
+                    let of = move |z: &[f64]| vec![(key, known * (PARAMETER * z[0]).exp())];
+                    let own = place.clone();
+                    let at = move |case: &Case| Some(vec![logarithm(entry(case, effect, &own)? / known)?]);
+                    Candidate::new(effect, place.clone(), vec![Coordinate::FREE], of).setting(at)
                 }
                 _ => Candidate::new(effect, place.clone(), vec![Coordinate::FREE], of),
             };
@@ -81,15 +87,20 @@ fn of_linear_structure(baseline: &Baseline<'_>, along: &[Along], all: &mut Vec<C
     }
 }
 
+/// Coordinate of a factor; `None` if that is not positive.
+fn logarithm(factor: f64) -> Option<f64> {
+    (factor > 0.0).then(|| factor.ln() / PARAMETER)
+}
+
 /// Diagonal entry of the matrix of an effect along the direction of a place; `None` for the whole structure, or one that
 /// is not given by matrices.
-fn entry(baseline: &Baseline<'_>, effect: EffectName, place: &Location) -> Option<f64> {
-    let Form::Matrices(matrices) = &baseline.structure.form else {
+fn entry(case: &Case, effect: EffectName, place: &Location) -> Option<f64> {
+    let structure = case.structure.as_ref()?;
+    let Form::Matrices(matrices) = &structure.form else {
         return None;
     };
     let direction = place.direction()?;
-    let index = baseline
-        .structure
+    let index = structure
         .directions
         .iter()
         .position(|other| *other == direction)?;
@@ -139,12 +150,19 @@ fn of_process(baseline: &Baseline<'_>, records: &[ReducedCut], all: &mut Vec<Can
             ("kac_mpa", material.kac_mpa * factor),
         ]
     };
-    all.push(Candidate::new(
-        EffectName::ForceCoefficients,
-        Location::Everywhere,
-        vec![Coordinate::FREE],
-        factor,
-    ));
+    let at = move |case: &Case| {
+        let other = case.material().ok()?;
+        Some(vec![logarithm(other.ktc_mpa / material.ktc_mpa)?])
+    };
+    all.push(
+        Candidate::new(
+            EffectName::ForceCoefficients,
+            Location::Everywhere,
+            vec![Coordinate::FREE],
+            factor,
+        )
+        .setting(at),
+    );
     let sees_axial = tool.edge_angle_deg != 90.0 || material.kac_mpa != 0.0;
     let components = if sees_axial { 3 } else { 2 };
     let each = move |z: &[f64]| {
@@ -162,12 +180,31 @@ fn of_process(baseline: &Baseline<'_>, records: &[ReducedCut], all: &mut Vec<Can
         ];
         all[..components].to_vec()
     };
-    all.push(Candidate::new(
-        EffectName::ForceCoefficients,
-        Location::Everywhere,
-        vec![Coordinate::FREE; components],
-        each,
-    ));
+    let at = move |case: &Case| {
+        let other = case.material().ok()?;
+        let of = |mpa: f64, known_mpa: f64| {
+            if known_mpa == 0.0 {
+                Some(mpa / (PARAMETER * material.ktc_mpa))
+            } else {
+                logarithm(mpa / known_mpa)
+            }
+        };
+        let all = [
+            of(other.ktc_mpa, material.ktc_mpa)?,
+            of(other.krc_mpa, material.krc_mpa)?,
+            of(other.kac_mpa, material.kac_mpa)?,
+        ];
+        Some(all[..components].to_vec())
+    };
+    all.push(
+        Candidate::new(
+            EffectName::ForceCoefficients,
+            Location::Everywhere,
+            vec![Coordinate::FREE; components],
+            each,
+        )
+        .setting(at),
+    );
     let width = PARAMETER * material.ktc_mpa * feed_mm;
     let edge = move |z: &[f64]| {
         let all = [
@@ -180,12 +217,24 @@ fn of_process(baseline: &Baseline<'_>, records: &[ReducedCut], all: &mut Vec<Can
         ];
         all[..components].to_vec()
     };
-    all.push(Candidate::new(
-        EffectName::EdgeForce,
-        Location::Everywhere,
-        vec![Coordinate::FREE; components],
-        edge,
-    ));
+    let at = move |case: &Case| {
+        let other = case.material().ok()?;
+        let all = [
+            other.kte_n_per_mm - material.kte_n_per_mm,
+            other.kre_n_per_mm - material.kre_n_per_mm,
+            other.kae_n_per_mm - material.kae_n_per_mm,
+        ];
+        Some(all[..components].iter().map(|change| change / width).collect())
+    };
+    all.push(
+        Candidate::new(
+            EffectName::EdgeForce,
+            Location::Everywhere,
+            vec![Coordinate::FREE; components],
+            edge,
+        )
+        .setting(at),
+    );
     let power = move |z: &[f64]| {
         vec![
             ("exponent", (-EXPONENT * z[0]).exp()),
@@ -219,20 +268,35 @@ fn of_tool(baseline: &Baseline<'_>, all: &mut Vec<Candidate>) {
     if tool.teeth < 2 {
         return;
     }
-    let (known_um, known_rad) = tool.runout.map_or((0.0, 0.0), |runout| {
-        (runout.offset_um, runout.angle_deg.to_radians())
-    });
+    let offset_um = |tool: &Tool| {
+        let runout = tool.runout.as_ref();
+        runout.map_or([0.0; 2], |runout| {
+            let angle_rad = runout.angle_deg.to_radians();
+            [
+                runout.offset_um * angle_rad.cos(),
+                runout.offset_um * angle_rad.sin(),
+            ]
+        })
+    };
+    let known_um = offset_um(tool);
     let offset = move |z: &[f64]| {
-        let x = known_um * known_rad.cos() + RUNOUT_UM * z[0];
-        let y = known_um * known_rad.sin() + RUNOUT_UM * z[1];
+        let [x, y] = std::array::from_fn(|index| known_um[index] + RUNOUT_UM * z[index]);
         vec![("runout_um", x.hypot(y)), ("angle_deg", y.atan2(x).to_degrees())]
     };
-    all.push(Candidate::new(
-        EffectName::Runout,
-        Location::Everywhere,
-        vec![Coordinate::FREE; 2],
-        offset,
-    ));
+    let at = move |case: &Case| {
+        let other_um = offset_um(case.tool().ok()?);
+        let of = |(other, known): (f64, f64)| (other - known) / RUNOUT_UM;
+        Some(other_um.into_iter().zip(known_um).map(of).collect())
+    };
+    all.push(
+        Candidate::new(
+            EffectName::Runout,
+            Location::Everywhere,
+            vec![Coordinate::FREE; 2],
+            offset,
+        )
+        .setting(at),
+    );
 }
 
 /// The width of process damping is that of a force along the chip as large as that of a structural damper of the ratio
@@ -261,15 +325,21 @@ fn of_process_damping(baseline: &Baseline<'_>, records: &[ReducedCut], all: &mut
         .fold(f64::INFINITY, f64::min);
     let damping = 2.0 * DAMPING_RATIO * stiffest / (std::f64::consts::TAU * hertz);
     let width = damping * speed_per_depth;
-    let of = move |z: &[f64]| vec![("process_damping_n_per_m", width * z[0])];
+    let along_chip = move |z: &[f64]| vec![("process_damping_n_per_m", width * z[0])];
+    let with_friction = move |z: &[f64]| {
+        vec![
+            ("process_damping_n_per_m", width * z[0]),
+            ("friction", FLANK_FRICTION * z[1]),
+        ]
+    };
+    let (effect, place) = (EffectName::ProcessDamping, Location::Everywhere);
+    let coordinates = vec![Coordinate::POSITIVE];
+    all.push(Candidate::new(effect, place.clone(), coordinates, along_chip).vanishing_at_zero());
+    let coordinates = vec![Coordinate::POSITIVE; 2];
     all.push(
-        Candidate::new(
-            EffectName::ProcessDamping,
-            Location::Everywhere,
-            vec![Coordinate::POSITIVE],
-            of,
-        )
-        .vanishing_at_zero(),
+        Candidate::new(effect, place, coordinates, with_friction)
+            .vanishing_at_zero()
+            .started_at(vec![vec![FAINT, 1.0]]),
     );
 }
 

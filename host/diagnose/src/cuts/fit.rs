@@ -68,9 +68,6 @@ impl Fit {
     }
 }
 
-/// Derivatives of the residuals of one record by all variables of a space, columns of `None` where they are zero.
-type Columns = Vec<Option<Vec<f64>>>;
-
 impl State {
     fn new(
         space: &Space<'_>,
@@ -107,7 +104,8 @@ impl State {
         })
     }
 
-    /// Derivatives of the predicted amplitudes, in standard deviations, by the variables from the number `first` on.
+    /// Derivatives of the predicted amplitudes, in standard deviations, by the variables from the number `first` on: values ×
+    /// variables.
     fn columns(
         &self,
         space: &Space<'_>,
@@ -115,7 +113,7 @@ impl State {
         first: usize,
         number: usize,
         record: &ReducedCut,
-    ) -> Columns {
+    ) -> DMatrix<f64> {
         let column = |index: usize| -> Option<Vec<f64>> {
             if !space.acts_on(index, number) {
                 return None;
@@ -123,17 +121,32 @@ impl State {
             match &space.variables[index] {
                 Variable::Phase(_) => {
                     let turned = &self.middle.by_phase * Complex64::from(phase_deviation(record));
-                    Some(record.errors.whitened(&turned, None))
+                    Some(record.errors.independent(&turned, None))
                 }
                 _ => self.difference(space, z, index, number, record),
             }
         };
-        (first..space.variables.len())
+        let found: Vec<Option<Vec<f64>>> = (first..space.variables.len())
             .into_par_iter()
             .map(column)
-            .collect()
+            .collect();
+        let rows = record.errors.count();
+        let acting: Vec<usize> = (0..found.len()).filter(|index| found[*index].is_some()).collect();
+        let mut own = DMatrix::from_iterator(
+            rows,
+            acting.len(),
+            found.iter().flatten().flat_map(|column| column.iter().copied()),
+        );
+        record.errors.decorrelate(&mut own);
+        let mut columns = DMatrix::zeros(rows, found.len());
+        for (own, index) in own.column_iter().zip(acting) {
+            columns.set_column(index, &own);
+        }
+        columns
     }
 
+    /// Derivative of the predicted amplitudes by a variable, as values whose errors are independent but for what is common to
+    /// the orders.
     fn difference(
         &self,
         space: &Space<'_>,
@@ -156,7 +169,7 @@ impl State {
             }
             _ => None,
         };
-        Some(record.errors.whitened(&middle, trend.as_ref()))
+        Some(record.errors.independent(&middle, trend.as_ref()))
     }
 }
 
@@ -187,22 +200,18 @@ fn update(
     records: &[ReducedCut],
     states: &[State],
 ) {
-    let all: Vec<Columns> = states
-        .iter()
+    let all: Vec<DMatrix<f64>> = states
+        .par_iter()
         .zip(records)
         .enumerate()
         .map(|(number, (state, record))| state.columns(space, z, first, number, record))
         .collect();
     let mut row = 0;
-    for (columns, record) in all.iter().zip(records) {
-        for (index, column) in columns.iter().enumerate() {
-            let mut own = jacobian.view_mut((row, first + index), (record.errors.count(), 1));
-            match column {
-                Some(column) => own.copy_from_slice(column),
-                None => own.fill(0.0),
-            }
-        }
-        row += record.errors.count();
+    for columns in &all {
+        jacobian
+            .view_mut((row, first), columns.shape())
+            .copy_from(columns);
+        row += columns.nrows();
     }
 }
 
@@ -254,7 +263,7 @@ pub(crate) fn fit(
         let residual = stacked(&current);
         let position = DVector::from_column_slice(&z);
         let cost = residual.norm_squared() + position.norm_squared();
-        let normal = slopes.tr_mul(&slopes);
+        let normal = slopes.transpose() * &slopes;
         let gradient = slopes.tr_mul(&residual) - &position;
         let Some((moved, predicted)) = step(space, &z, &normal, &gradient, damping) else {
             break;
@@ -291,7 +300,7 @@ pub(crate) fn fit(
         update(&mut slopes, 0, space, &z, records, &current);
     }
     let residual = stacked(&current);
-    let mut information = slopes.tr_mul(&slopes);
+    let mut information = slopes.transpose() * &slopes;
     for index in 0..information.nrows() {
         information[(index, index)] += 1.0;
     }
@@ -329,15 +338,14 @@ fn step(
             }
         }
         let change = Cholesky::new(matrix)?.solve(&right);
-        let mut beyond = false;
-        for index in 0..size {
-            let is_below = z[index] <= space.lower(index) && change[index] < 0.0;
-            if is_below && !held[index] {
-                held[index] = true;
-                beyond = true;
-            }
-        }
-        if beyond {
+        // One at a time: held at its bound, it may turn another back into the range.
+        let is_beyond =
+            |index: &usize| !held[*index] && z[*index] <= space.lower(*index) && change[*index] < 0.0;
+        let farthest = (0..size)
+            .filter(is_beyond)
+            .min_by(|a, b| change[*a].total_cmp(&change[*b]));
+        if let Some(index) = farthest {
+            held[index] = true;
             continue;
         }
         let moved: Vec<f64> = (0..size)
@@ -392,14 +400,19 @@ impl Fit {
         let mut columns = DMatrix::zeros(rows, coordinates.len());
         let mut row = 0;
         for (number, (state, record)) in self.states.iter().zip(records).enumerate() {
-            // Where an effect with an internal state is faint, only its size acts.
-            let count = if candidate.has_state { 1 } else { coordinates.len() };
+            // Where an effect is faint, only its size acts.
+            let count = if candidate.is_faint_at_start() {
+                1
+            } else {
+                coordinates.len()
+            };
+            let mut own = DMatrix::zeros(record.errors.count(), coordinates.len());
             for index in 0..count {
                 let column = state.difference(&wider, &z, first + index, number, record)?;
-                columns
-                    .view_mut((row, index), (column.len(), 1))
-                    .copy_from_slice(&column);
+                own.column_mut(index).copy_from_slice(&column);
             }
+            record.errors.decorrelate(&mut own);
+            columns.view_mut((row, 0), own.shape()).copy_from(&own);
             row += record.errors.count();
         }
         Some(columns)

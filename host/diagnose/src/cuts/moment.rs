@@ -9,9 +9,11 @@ use super::record::ReducedCut;
 use super::space::{Space, Variable};
 use quietcut_stability::cut_orbit::{CutOrbit, ForceOrders, OrderWeights};
 
-/// Step of a difference of what a variable changes explicitly, in its standard deviations. The error is half of it times
-/// the curvature, and rounding over it.
-const DIFFERENCE: f64 = 1e-3;
+/// Step of a difference of what a variable changes explicitly, in its standard deviations. The relative error is half of it times
+/// the curvature, and rounding over it, 1e-8. Derivatives of an effect and of what is uncertain of the baseline in the same
+/// parameter must agree beyond what the records resolve, 1e-4 of a deviation, so that their common direction is paid for by the
+/// prior alone.
+const DIFFERENCE: f64 = 1e-6;
 
 /// A machine in a cut at one time.
 pub(super) struct Moment {

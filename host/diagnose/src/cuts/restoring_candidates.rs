@@ -17,8 +17,8 @@ pub(super) const DAMPING_RATIO: f64 = 0.05;
 const COMPLIANCE: f64 = 0.3;
 /// Lowest coordinate of the yield of a hysteresis loop: at a twenty-seventh of the motion, where it is friction.
 const EARLIEST_YIELD: f64 = -2.0;
-/// Coordinate of an effect with an internal state at which it is compared with the records to first order.
-const FAINT: f64 = 0.01;
+/// Size of an effect with a shape at which it is compared with the records to first order.
+pub(super) const FAINT: f64 = 0.01;
 
 /// Sizes of the motion of the baseline along an axis.
 #[derive(Clone, Copy, Debug)]
@@ -102,6 +102,20 @@ pub(super) fn of_restoring_force(along: Along, all: &mut Vec<Candidate>) {
         .vanishing_at_zero()
         .started_at(vec![vec![0.1], vec![0.5]]),
     );
+    // One of parallel springs has the gap.
+    let partial = move |z: &[f64]| {
+        vec![
+            ("gap_mm", 1e3 * x * (3.0_f64.ln() * z[1]).exp()),
+            ("stiffness_fraction", 1.0 - (-NONLINEAR * z[0]).exp()),
+        ]
+    };
+    let coordinates = vec![Coordinate::POSITIVE, Coordinate::FREE];
+    let gaps = [-1.5, -0.5, 0.5].map(|width| vec![FAINT, width]);
+    all.push(
+        Candidate::new(EffectName::Backlash, place.clone(), coordinates, partial)
+            .vanishing_at_zero()
+            .started_at(gaps.to_vec()),
+    );
     // Yields at a third of the motion; a loop that yields much later is linear, one that yields much earlier is friction.
     let loops = move |z: &[f64]| {
         vec![
@@ -119,7 +133,6 @@ pub(super) fn of_restoring_force(along: Along, all: &mut Vec<Candidate>) {
     all.push(
         Candidate::new(EffectName::Hysteresis, place, coordinates, loops)
             .vanishing_at_zero()
-            .with_state()
             .started_at(yields.to_vec()),
     );
 }

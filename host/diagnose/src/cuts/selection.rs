@@ -133,6 +133,9 @@ fn reduced<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut]
 /// All candidates are scored from the derivatives of `best`, and the first few are fitted.
 fn extended<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut]) -> Vec<Explanation<'a>> {
     let prior = priors(all);
+    let Some(case) = best.space.case(&best.fit.z) else {
+        return Vec::new();
+    };
     let starts = all
         .par_iter()
         .enumerate()
@@ -143,12 +146,22 @@ fn extended<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut
                 .iter()
                 .any(|known| is_same(known, candidate) || share_a_term(known, candidate))
         })
-        .flat_map_iter(|(index, candidate)| candidate.starts().into_iter().map(move |start| (index, start)));
+        .flat_map_iter(|(index, candidate)| {
+            candidate
+                .starts(&case)
+                .into_iter()
+                .map(move |start| (index, start))
+        });
     let mut scored: Vec<Scored> = starts
         .filter_map(|(index, start)| {
-            let (gain, start) = score(best, &all[index], &start, records)?;
+            let (gain, end) = score(best, &all[index], &start, records)?;
             let gain = gain + prior[index];
-            (gain > 0.0).then_some(Scored { index, gain, start })
+            (gain > 0.0).then_some(Scored {
+                index,
+                gain,
+                at: start,
+                start: end,
+            })
         })
         .collect();
     scored.sort_by(|a, b| b.gain.total_cmp(&a.gain).then(a.index.cmp(&b.index)));
@@ -160,11 +173,43 @@ fn extended<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut
         }
         is_new
     });
+    for (place, scored) in scored.iter().enumerate() {
+        let candidate = &all[scored.index];
+        let Scored { gain, start, .. } = scored;
+        tracing::debug!(
+            place,
+            gain,
+            ?start,
+            "ranked: {} {}",
+            candidate.effect.name(),
+            candidate.location
+        );
+    }
     scored.truncate(FITTED);
     let fitted = |scored: Scored| {
-        let space = best.space.with(&all[scored.index]);
-        let start: Vec<f64> = best.fit.z.iter().copied().chain(scored.start).collect();
-        let fitted = fit(&space, records, start, Some(&best.fit))?;
+        let candidate = &all[scored.index];
+        let space = best.space.with(candidate);
+        // Where derivatives reach too far, there is no orbit near that of `best`: the start is then nearer.
+        let fitted = (0..NEARER_STARTS).find_map(|halvings| {
+            let share = 0.5_f64.powi(halvings);
+            let near = scored.at.iter().zip(&scored.start);
+            let start = near.map(|(at, start)| at + share * (start - at));
+            fit(
+                &space,
+                records,
+                best.fit.z.iter().copied().chain(start).collect(),
+                Some(&best.fit),
+            )
+        });
+        tracing::debug!(
+            gain = fitted.as_ref().map(|fitted| prior_of(best) + fitted.evidence() + prior[scored.index] - best.evidence),
+            left = fitted.as_ref().map(|fitted| fitted.left / fitted.residual.len() as f64),
+            z = ?fitted.as_ref().map(|fitted| &fitted.z[best.fit.z.len()..]),
+            "fitted: {} {}",
+            candidate.effect.name(),
+            candidate.location
+        );
+        let fitted = fitted?;
         Some(Explanation {
             evidence: prior_of(best) + fitted.evidence() + prior[scored.index],
             space,
@@ -181,6 +226,8 @@ fn extended<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut
 struct Scored {
     index: usize,
     gain: f64,
+    /// Coordinates at which the derivatives are taken.
+    at: Vec<f64>,
     start: Vec<f64>,
 }
 
@@ -248,6 +295,8 @@ fn score(
     let mixed = best.fit.jacobian.tr_mul(&columns);
     let gradient = columns.tr_mul(&best.fit.residual)
         - mixed.tr_mul(&factor.solve(&(best.fit.jacobian.tr_mul(&best.fit.residual) - position(best))));
+    let start_z = DVector::from_column_slice(start);
+    let gradient = gradient - &start_z;
     let own = columns.tr_mul(&columns) - mixed.tr_mul(&factor.solve(&mixed));
     let information: DMatrix<f64> = own + DMatrix::identity(start.len(), start.len());
     let own_factor = Cholesky::new(information)?;
@@ -265,7 +314,7 @@ fn score(
         .zip(change.iter())
         .zip(&candidate.coordinates)
         .all(|((z, change), coordinate)| *z > coordinate.lower || *change == 0.0);
-    let gain = 0.5 * gradient.dot(&change) - determinant;
+    let gain = 0.5 * (gradient.dot(&change) - start_z.norm_squared()) - determinant;
     let z = if inside {
         z
     } else {
@@ -274,6 +323,8 @@ fn score(
     Some((if inside { gain } else { gain.min(0.0) - determinant }, z))
 }
 
+/// Number of starts of a fit, each half as far from where derivatives are taken as that before.
+const NEARER_STARTS: i32 = 5;
 /// Farthest start of a fit, in widths: a derivative at the baseline does not reach farther.
 const REACH: f64 = 2.0;
 

@@ -196,7 +196,7 @@ impl<'a> Space<'a> {
     }
 
     /// The case at a point of the space.
-    fn case(&self, z: &[f64]) -> Option<Case> {
+    pub(super) fn case(&self, z: &[f64]) -> Option<Case> {
         let (variables, at): (Vec<CaseVariable>, Vec<f64>) = self
             .of_case()
             .map(|(number, variable)| (variable.clone(), z[number]))

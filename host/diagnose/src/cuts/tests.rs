@@ -10,6 +10,7 @@ use super::record::ReducedCut;
 use super::selection::{Explanation, explain};
 use crate::baseline::Baseline;
 use crate::tests::cutting::{case, records};
+use quietcut_model::case::{Case, Deviation, Parameter};
 use quietcut_recording::Recording;
 use quietcut_testkit::slice;
 
@@ -19,8 +20,15 @@ fn explained(effects: &[&str]) -> (Vec<&'static str>, [f64; 2]) {
 }
 
 fn explained_in(recordings: &[Recording], effects: &[&str]) -> (Vec<&'static str>, [f64; 2]) {
-    let baseline_case = case("0.15", "");
-    let baseline = Baseline::new(&baseline_case).unwrap();
+    explained_beside(&case("0.15", ""), recordings, effects)
+}
+
+fn explained_beside(
+    baseline_case: &Case,
+    recordings: &[Recording],
+    effects: &[&str],
+) -> (Vec<&'static str>, [f64; 2]) {
+    let baseline = Baseline::new(baseline_case).unwrap();
     let reduced: Vec<ReducedCut> = recordings
         .iter()
         .map(|recording| ReducedCut::new(&baseline, recording).unwrap())
@@ -75,6 +83,28 @@ fn effects_far_from_the_baseline_and_below_the_noise_of_a_sample_are_explained()
         let (names, [baseline, best]) = explained(effects);
         assert_eq!(names, expected, "{effects:?}: {baseline} {best}");
         // χ² of 840 values per value: 1 ± 0.05, somewhat below since the variables are fitted.
+        assert!(best < 1.15, "{effects:?}: {best}");
+    }
+}
+
+#[test]
+fn effects_beside_an_uncertain_baseline_are_explained() {
+    let mut uncertain = case("0.15", "");
+    uncertain.deviations = Parameter::of_case(&uncertain)
+        .into_iter()
+        .filter_map(|parameter| {
+            let std = 0.015 * parameter.value(&uncertain)?.abs();
+            (std > 0.0).then_some(Deviation { parameter, std })
+        })
+        .collect();
+    let hidden: [(&[&str], &[&str]); 2] = [
+        // Ten deviations: without the effect, the uncertain stiffness itself has moved as far.
+        (&["stiffness=0.15", "stiffness.direction=x"], &["stiffness"]),
+        (&["force-coefficients=0.2"], &["force-coefficients"]),
+    ];
+    for (effects, expected) in hidden {
+        let (names, [baseline, best]) = explained_beside(&uncertain, &records(effects, true, 7), effects);
+        assert_eq!(names, expected, "{effects:?}: {baseline} {best}");
         assert!(best < 1.15, "{effects:?}: {best}");
     }
 }

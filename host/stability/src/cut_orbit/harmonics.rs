@@ -11,7 +11,6 @@ use super::model::CutModel;
 use super::orbit::CutOrbit;
 use super::period::Period;
 use super::sensitivity::Sensitivity;
-use quietcut_numerics::quadrature::Gauss;
 
 /// Fourier coefficients F_k of forces along x, y, z, N, at the multiples k = 0, 1, … of the spindle frequency:
 /// F(t) = Σ_k F_k e^{ikΩt} over positive and negative k, F_{−k} the conjugate of F_k.
@@ -26,7 +25,7 @@ pub struct ForceOrders {
 
 /// Weights of the nodes of a mesh in Fourier coefficients up to an order.
 pub struct OrderWeights {
-    /// By subinterval: nodes × orders.
+    /// By subinterval: ∫ ℓ_j e^{−ikΩt} dt/T, orders × nodes.
     weights: Vec<DMatrix<Complex64>>,
     orders: usize,
     revolution_s: f64,
@@ -41,11 +40,16 @@ impl OrderWeights {
             let share = subinterval.duration_s / mesh.revolution_s;
             let base = known
                 .entry(key)
-                .or_insert_with(|| integrals(mesh.gauss, share, orders));
+                .or_insert_with(|| mesh.gauss.fourier(TAU * share, orders) * Complex64::from(share));
             let mut weights = base.clone();
             let phase = -TAU * subinterval.start_s / mesh.revolution_s;
-            for (order, mut column) in weights.column_iter_mut().enumerate() {
-                column *= Complex64::cis(phase * order as f64);
+            let turns: Vec<Complex64> = (0..orders)
+                .map(|order| Complex64::cis(phase * order as f64))
+                .collect();
+            for mut column in weights.column_iter_mut() {
+                for (weight, turn) in column.iter_mut().zip(&turns) {
+                    *weight *= turn;
+                }
             }
             weights
         };
@@ -61,11 +65,11 @@ impl OrderWeights {
         let mut orders = DMatrix::zeros(self.orders, count);
         let mut node = 0;
         for weights in &self.weights {
-            for row in weights.row_iter() {
+            for of_node in weights.column_iter() {
                 for component in 0..count {
                     let force = of(node, component);
                     if force != 0.0 {
-                        for (sum, weight) in orders.column_mut(component).iter_mut().zip(row.iter()) {
+                        for (sum, weight) in orders.column_mut(component).iter_mut().zip(of_node.iter()) {
                             *sum += weight * force;
                         }
                     }
@@ -75,31 +79,6 @@ impl OrderWeights {
         }
         orders
     }
-}
-
-/// ∫ ℓ_j e^{−ikΩt} dt/T over a subinterval that takes `share` of a revolution and begins at t = 0; nodes × orders.
-fn integrals(gauss: &Gauss, share: f64, orders: usize) -> DMatrix<Complex64> {
-    let turns = share * orders as f64;
-    // A Gauss rule of n nodes integrates e^{iωt} over a length L to rounding if n exceeds ωL/2 + 10; longer
-    // subintervals are cut.
-    let pieces = (TAU * turns / 30.0).ceil().max(1.0);
-    let fine = Gauss::shared(gauss.nodes.len() + 25);
-    let mut sum = DMatrix::zeros(gauss.nodes.len(), orders);
-    for piece in 0..pieces as usize {
-        for (node, weight) in fine.nodes.iter().zip(&fine.weights) {
-            let place = (piece as f64 + node) / pieces;
-            let lagrange = gauss.lagrange(place);
-            let turn = Complex64::cis(-TAU * share * place);
-            let mut factor = Complex64::from(weight * share / pieces);
-            for order in 0..orders {
-                for (sum, lagrange) in sum.column_mut(order).iter_mut().zip(&lagrange) {
-                    *sum += factor * lagrange;
-                }
-                factor *= turn;
-            }
-        }
-    }
-    sum
 }
 
 impl CutOrbit {

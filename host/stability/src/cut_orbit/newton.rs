@@ -257,6 +257,8 @@ pub(super) struct Step {
     pub(super) moved: f64,
     /// Instants of the events at which the inputs jump: number of the event, s.
     pub(super) instants_s: Vec<(usize, f64)>,
+    /// The equations, about the motion before the step.
+    pub(super) linearized: Linearization,
 }
 
 /// The share `share` of a Newton step from `motion` on `mesh`.
@@ -315,11 +317,13 @@ pub(super) fn step(
         .filter_map(|(jump, delay_s)| {
             let of = &mesh.subintervals[jump.size.subinterval];
             Some((of.event?, of.start_s + share * delay_s))
-        });
+        })
+        .collect();
     (size.is_finite() && moved.is_finite()).then(|| Step {
         motion: next,
         moved: if size > 0.0 { moved / size } else { 0.0 },
-        instants_s: instants.collect(),
+        instants_s: instants,
+        linearized,
     })
 }
 

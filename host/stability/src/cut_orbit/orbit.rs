@@ -26,8 +26,9 @@ const STEPS: usize = 20;
 /// Largest relative step of the displacement at the end of a search on a mesh that a finer one may resolve: events that
 /// lie in the surface near another event move by as much as the motion between the nodes errs.
 const RESOLVABLE: f64 = 1e-3;
-/// Largest number of events in a revolution: beyond, a motion is far from any orbit.
-const MOST_EVENTS: usize = 256;
+/// Largest number of events in a revolution: beyond, a motion is far from any orbit, or the dense equations of a Newton step,
+/// whose cost grows with the cube of the subintervals, take longer than a second.
+const MOST_EVENTS: usize = 64;
 /// Number of Newton steps without one of half the size of the smallest before, after which a search ends.
 const STALLED: usize = 7;
 /// Depth of the shallow cut from which an orbit is followed, as a share of that of the cut.
@@ -289,6 +290,7 @@ impl Start {
         let not_periodic = CutOrbitError::NoPeriodicResponse { rpm };
         let (mut last, mut share) = (f64::INFINITY, 1.0);
         let (mut least, mut since) = (f64::INFINITY, 0);
+        let mut linearized = None;
         for _ in 0..STEPS {
             *steps += 1;
             let step = newton::step(model, ports, &self.mesh, &self.motion, share)
@@ -315,6 +317,8 @@ impl Start {
             self.motion = step.motion;
             if alike && moved < CONVERGED && events_moved < EVENT_FOUND {
                 last = full;
+                // About a motion that is this one but for [`CONVERGED`].
+                linearized = Some(step.linearized);
                 break;
             }
             if !alike || events_moved > 0.0 {
@@ -340,21 +344,31 @@ impl Start {
         if last > RESOLVABLE {
             return Err(CutOrbitError::not_converged(model, *steps, last));
         }
-        let orbit = self.orbit(model, ports, *steps).ok_or(not_periodic)?;
+        let orbit = self.orbit(model, ports, *steps, linearized).ok_or(not_periodic)?;
         Ok(Settled { orbit, change: last })
     }
 
-    fn orbit(&self, model: &CutModel, ports: &Ports, steps: usize) -> Option<CutOrbit> {
+    /// The orbit of the motion, with its equations if they are known.
+    fn orbit(
+        &self,
+        model: &CutModel,
+        ports: &Ports,
+        steps: usize,
+        linearized: Option<Linearization>,
+    ) -> Option<CutOrbit> {
         let period = Period {
             model,
             ports,
             mesh: &self.mesh,
             motion: &self.motion,
         };
-        let response = Response::new(&self.mesh, ports)?;
+        let linearized = match linearized {
+            Some(linearized) => linearized,
+            None => period.linearized(&Response::new(&self.mesh, ports)?)?,
+        };
         Some(CutOrbit {
             forces: period.forces(),
-            linearized: period.linearized(&response)?,
+            linearized,
             ports: ports.clone(),
             mesh: self.mesh.clone(),
             motion: self.motion.clone(),
