@@ -3,8 +3,9 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Constraint, Layout, Rect};
 
+use super::frame::{framed, put};
 use super::palette::Palette;
-use super::{framed, lobes, map, put, spectrum};
+use super::{lobes, map, spectrum};
 use crate::monitor::choices::{Chart, Choices};
 use crate::monitor::heard::Heard;
 

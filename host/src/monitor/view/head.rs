@@ -5,9 +5,9 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
 
+use super::frame::put;
 use super::letters::{self, Size};
 use super::palette::Palette;
-use super::put;
 use crate::monitor::heard::{Connection, Heard, STRIP_S};
 use crate::report::words;
 

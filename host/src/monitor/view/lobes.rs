@@ -5,8 +5,8 @@ use quietcut_core::units::Millimeters;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
+use super::frame::{framed, put};
 use super::palette::Palette;
-use super::{framed, put};
 use crate::monitor::heard::Heard;
 use crate::monitor::lobes::{LobeMap, letter};
 

@@ -8,8 +8,8 @@ use ratatui::symbols::Marker;
 use ratatui::widgets::Widget;
 use ratatui::widgets::canvas::{Canvas, Points};
 
+use super::frame::{framed, put};
 use super::palette::Palette;
-use super::{framed, put};
 use crate::monitor::choices::{AXES, Choices};
 use crate::monitor::heard::Heard;
 

@@ -1,6 +1,7 @@
 //! Draws what was heard: layout by the size of the terminal.
 
 mod charts;
+mod frame;
 mod head;
 mod letters;
 mod lobes;
@@ -8,13 +9,10 @@ mod map;
 pub(crate) mod palette;
 mod spectrum;
 
-use quietcut_core::monitor::Band;
 use ratatui::Frame;
-use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
-use ratatui::style::Style;
-use ratatui::widgets::{Block, Widget};
 
+use self::frame::put;
 use self::palette::Palette;
 use super::choices::Choices;
 use super::heard::Heard;
@@ -48,30 +46,4 @@ pub(crate) fn draw(frame: &mut Frame<'_>, heard: &Heard, choices: &Choices, pale
         "q quit   Tab next chart   Space freeze   b band   a axes   + - 0 zoom   c clear map   r redraw"
     };
     put(keys, 0, text, palette.faint(), buffer);
-}
-
-/// Name of a band.
-fn band_name(band: Band) -> &'static str {
-    match band {
-        Band::Structure => "structure",
-        Band::Tool => "tool",
-    }
-}
-
-/// Draws a frame with a title; returns the area inside of it.
-fn framed(title: &str, palette: Palette, area: Rect, buffer: &mut Buffer) -> Rect {
-    let block = Block::bordered()
-        .title(title.to_owned())
-        .border_style(palette.faint())
-        .title_style(palette.title());
-    let inside = block.inner(area);
-    block.render(area, buffer);
-    inside
-}
-
-/// Writes one line of text in a row of `area`, cut at its right end.
-fn put(area: Rect, row: u16, text: &str, style: Style, buffer: &mut Buffer) {
-    if row < area.height && area.width > 0 {
-        buffer.set_stringn(area.x, area.y + row, text, usize::from(area.width), style);
-    }
 }

@@ -3,8 +3,8 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
+use super::frame::{band_name, framed, put};
 use super::palette::Palette;
-use super::{framed, put};
 use crate::monitor::choices::Choices;
 use crate::monitor::heard::Heard;
 
@@ -20,7 +20,7 @@ const HARMONICS: f64 = 8.0;
 /// Draws the spectrum of the chosen band.
 pub(super) fn draw(heard: &Heard, choices: &Choices, palette: Palette, area: Rect, buffer: &mut Buffer) {
     let spectrum = heard.spectrum(choices.band);
-    let band = super::band_name(choices.band);
+    let band = band_name(choices.band);
     let title = format!(" spectrum, {band}, top {} ", peak_text(&spectrum.power));
     let inside = framed(&title, palette, area, buffer);
     if inside.height < 3 || inside.width < 8 {
