@@ -76,16 +76,16 @@ fn pause(stop: &AtomicBool) {
 
 /// True if the fault can pass without a change by the user: a pulled cable, a device that restarts.
 fn may_return(error: &DeviceError) -> bool {
-    match error {
+    matches!(
+        error,
         DeviceError::NoPort { .. }
-        | DeviceError::Open { .. }
-        | DeviceError::Unplugged { .. }
-        | DeviceError::Line { .. }
-        | DeviceError::NoAnswer { .. }
-        | DeviceError::Frames { .. }
-        | DeviceError::Refused { .. } => true,
-        _ => false,
-    }
+            | DeviceError::Open { .. }
+            | DeviceError::Unplugged { .. }
+            | DeviceError::Line { .. }
+            | DeviceError::NoAnswer { .. }
+            | DeviceError::Frames { .. }
+            | DeviceError::Refused { .. }
+    )
 }
 
 /// Listens on one connection until `stop`; returns the number of messages lost on it.
