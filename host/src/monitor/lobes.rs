@@ -134,7 +134,7 @@ impl std::fmt::Display for Margin {
             Self::Unstable { limit_mm } => {
                 write!(
                     f,
-                    "none: the table is unstable at this depth, its first limit is {limit_mm:.2} mm"
+                    "none: not stable at this depth in the table, whose first limit is {limit_mm:.2} mm"
                 )
             }
             Self::NoDepth => f.write_str("not known: set the depth with `quietcut working-point`"),

@@ -6,15 +6,18 @@ use std::sync::mpsc::sync_channel;
 use std::time::{Duration, Instant};
 
 use quietcut_core::detector::{Judgement, Reason, Verdict};
+use quietcut_core::lobes::{Content, Interval, IntervalKind, Layer, Validity, encode, encoded_length};
 use quietcut_core::monitor::{Band, Report, Strobe};
 use quietcut_core::protocol::{SpectrumChunk, StrobeChunk};
-use quietcut_core::units::{Hertz, Nanoseconds, Rpm};
+use quietcut_core::units::{Degrees, Hertz, Millimeters, Nanoseconds, Rpm};
+use quietcut_core::working_point::WorkingPoint;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 
 use super::choices::{Chart, Choices};
 use super::heard::{Connection, Heard, Identity};
 use super::link::{self, News};
+use super::lobes::{LobeMap, Margin};
 use super::spectrum::Spectrum;
 use super::view::{self, palette::Palette};
 use crate::device::port::SerialLine;
@@ -105,7 +108,7 @@ fn each_size_says_verdict_speed_and_keys() {
     assert!(narrow.contains("1045"), "the speed is cut off in\n{narrow}");
     let text = picture(&heard, &Choices::default(), (20, 5)).join("\n");
     assert!(
-        text.contains("CHATTER 1045") && text.contains("needs 40 x 12"),
+        text.contains("CHATTER 1045") && text.contains("min 40 x 12"),
         "{text}"
     );
 }
@@ -199,6 +202,109 @@ fn a_lost_device_is_told_and_its_last_report_is_not_shown_as_live() {
         told[0].contains("is back") && told[1].contains("is gone"),
         "{told:?}"
     );
+}
+
+/// A table from 600 to 800 rev/min and 6 mm: a Hopf limit at 1.5 mm, and again stable from 3 to 4 mm.
+fn lobes(depth_mm: Option<f32>) -> LobeMap {
+    let hopf = |from, to| Interval {
+        from: Millimeters(from),
+        to: Millimeters(to),
+        kind: IntervalKind::Hopf,
+        chatter: Hertz(17.4),
+    };
+    let column = [hopf(1.5, 3.0), hopf(4.0, 6.0)];
+    let validity = Validity {
+        feed_from: Millimeters(0.0),
+        feed_to: Millimeters(0.3),
+        start: Degrees(90.0),
+        exit: Degrees(180.0),
+        posture: 0,
+    };
+    let content = Content {
+        name: "two limits",
+        teeth: 2,
+        limits: None,
+        depth_from: Millimeters(0.0),
+        depth_to: Millimeters(6.0),
+        speeds: &[Rpm(600.0), Rpm(800.0)],
+        layers: &[Layer {
+            validity,
+            columns: &[&column, &column],
+        }],
+    };
+    let mut bytes = vec![0; encoded_length(&content) as usize];
+    encode(&content, &mut bytes).unwrap();
+    let point = depth_mm.map(|depth| WorkingPoint {
+        axial_depth: Millimeters(depth),
+        start: Degrees(90.0),
+        exit: Degrees(180.0),
+        feed_per_tooth: Millimeters(0.1),
+        posture: 0,
+    });
+    LobeMap::new(bytes, point).unwrap()
+}
+
+#[test]
+fn the_margin_is_the_distance_to_the_next_limit_above() {
+    let at = |depth| lobes(Some(depth)).margin(700.0).to_string();
+    assert!(
+        at(1.0).starts_with("0.50 mm below the limit of 1.50 mm"),
+        "{}",
+        at(1.0)
+    );
+    assert!(
+        at(3.5).starts_with("0.50 mm below the limit of 4.00 mm"),
+        "{}",
+        at(3.5)
+    );
+    assert!(at(2.0).starts_with("none: not stable"), "{}", at(2.0));
+    assert_eq!(lobes(None).margin(700.0), Margin::NoDepth);
+    let outside = lobes(Some(1.0)).margin(900.0).to_string();
+    assert!(
+        outside.contains("outside its range of 600 to 800 rev/min"),
+        "{outside}"
+    );
+}
+
+#[test]
+fn the_lobe_chart_marks_the_working_point() {
+    let mut heard = in_chatter();
+    heard.take(&Event::Report(Report {
+        speed: Some(Rpm(700.0)),
+        ..report(2000, Verdict::Stable)
+    }));
+    heard.lobes = Some(lobes(Some(1.0)));
+    let choices = Choices {
+        chart: Chart::Lobes,
+        ..Choices::default()
+    };
+    let rows = picture(&heard, &choices, (60, 24));
+    let text = rows.join("\n");
+    assert!(text.contains("lobes, ✚ 1.00 mm"), "{text}");
+    let point = rows
+        .iter()
+        .position(|row| row.contains('✚') && !row.contains("lobes"))
+        .unwrap();
+    let lowest_limit = rows.iter().rposition(|row| row.contains("HHHH")).unwrap();
+    assert!(point > lowest_limit, "{text}");
+    assert!(
+        text.contains("margin: 0.50 mm below the limit of 1.50 mm"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_text_that_does_not_fit_is_wrapped_or_says_that_it_is_cut() {
+    let mut heard = in_chatter();
+    let choices = Choices {
+        chart: Chart::History,
+        ..Choices::default()
+    };
+    heard.take(&Event::Report(report(3000, Verdict::PeriodDoubling)));
+    let text = picture(&heard, &choices, (40, 24)).join("\n");
+    assert!(text.contains("doubling)"), "{text}");
+    let narrow = picture(&heard, &choices, (40, 12)).join("\n");
+    assert!(narrow.contains('…'), "{narrow}");
 }
 
 #[test]

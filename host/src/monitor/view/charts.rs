@@ -2,8 +2,9 @@
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::style::Style;
 
-use super::frame::{framed, put};
+use super::frame::{framed, put, wrapped};
 use super::palette::Palette;
 use super::{lobes, map, spectrum};
 use crate::monitor::choices::{Chart, Choices};
@@ -47,16 +48,15 @@ pub(super) fn draw(heard: &Heard, choices: &Choices, palette: Palette, area: Rec
     }
 }
 
-/// The newest lines of the history, the newest at the top.
+/// The newest entries of the history, the newest at the top.
 fn draw_history(heard: &Heard, palette: Palette, area: Rect, buffer: &mut Buffer) {
     let inside = framed(" history, newest first ", palette, area, buffer);
-    for (row, line) in (0..inside.height).zip(heard.lines.iter().rev()) {
-        put(
-            inside,
-            row,
-            line.trim_start(),
-            ratatui::style::Style::new(),
-            buffer,
-        );
+    let lines = heard
+        .lines
+        .iter()
+        .rev()
+        .flat_map(|entry| wrapped(entry, inside.width));
+    for (row, line) in (0..inside.height).zip(lines) {
+        put(inside, row, &line, Style::new(), buffer);
     }
 }

@@ -5,7 +5,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
 
-use super::frame::put;
+use super::frame::{put, wrapped};
 use super::letters::{self, Size};
 use super::palette::Palette;
 use crate::monitor::heard::{Connection, Heard, STRIP_S};
@@ -13,6 +13,9 @@ use crate::report::words;
 
 /// Rows of a terminal from which margin and strip of verdicts are shown: a choice.
 const ROWS_OF_ALL: u16 = 20;
+
+/// Rows of a terminal from which the reason of the advice has two rows: a choice.
+const ROWS_OF_REASON: u16 = 30;
 
 /// Columns between the large verdict and the large speed: a choice.
 const GAP: u16 = 4;
@@ -33,7 +36,12 @@ pub(super) fn draw(heard: &Heard, frozen: bool, palette: Palette, area: Rect, bu
     line(&sentence(heard), palette.verdict(verdict(heard)));
     line(&advice(heard), Style::new());
     if area.height >= ROWS_OF_ALL {
-        line(&reason(heard), palette.faint());
+        // The reason may take two rows, which stay empty otherwise so that the charts do not jump.
+        let rows = if area.height >= ROWS_OF_REASON { 2 } else { 1 };
+        let reason = wrapped(&reason(heard), area.width);
+        for row in 0..rows {
+            line(reason.get(row).map_or("", String::as_str), palette.faint());
+        }
         line(&margin(heard), Style::new());
         draw_strip(heard, palette, below(used), buffer);
         used += 1;
@@ -59,7 +67,7 @@ pub(super) fn draw_small(
     );
     put(area, 1, &sentence(heard), Style::new(), buffer);
     put(area, 2, &advice(heard), Style::new(), buffer);
-    let hint = format!("needs {} x {}; q quits", least.0, least.1);
+    let hint = format!("min {} x {}; q quits", least.0, least.1);
     put(
         area,
         area.height.saturating_sub(1).max(3),
@@ -166,13 +174,16 @@ fn reason(heard: &Heard) -> String {
         let advice = report.advice?;
         Some(words::why(&advice, &report.judgement, report.speed))
     });
-    why.map_or_else(String::new, |why| format!("        {why}"))
+    why.map_or_else(String::new, |why| format!("reason: {why}"))
 }
 
 fn margin(heard: &Heard) -> String {
-    let counts = heard.report.map_or_else(String::new, |report| {
-        format!("; {} samples clipped, {} lost", report.clipped, report.lost)
-    });
+    let counts = match heard.report {
+        Some(report) if report.clipped > 0 || report.lost > 0 => {
+            format!("; {} samples clipped, {} lost", report.clipped, report.lost)
+        }
+        _ => String::new(),
+    };
     let margin = match (&heard.lobes, heard.rpm()) {
         (None, _) => "not known without --table FILE.qct".into(),
         (_, None) => "not known without a speed".into(),

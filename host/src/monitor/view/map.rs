@@ -34,20 +34,10 @@ pub(super) fn draw(heard: &Heard, choices: &Choices, palette: Palette, area: Rec
         .fold(LEAST_RANGE, f64::max);
     let range = largest * 1.1;
     let name = |axis: usize| AXES.get(axis).copied().unwrap_or_default();
-    let title = format!(
-        " map: {} across, {} up, ±{range:.2} m/s² ",
-        name(across),
-        name(up)
-    );
+    let title = format!(" map {} → {} ↑ ±{range:.2} m/s² ", name(across), name(up));
     let inside = framed(&title, palette, area, buffer);
     if points.is_empty() {
-        put(
-            inside,
-            0,
-            "no point yet: one per tooth passing, with a tachometer",
-            palette.faint(),
-            buffer,
-        );
+        put(inside, 0, "no tooth passing yet", palette.faint(), buffer);
         return;
     }
     let colour = palette.curve().fg.unwrap_or(Color::Reset);

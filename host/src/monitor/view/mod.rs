@@ -20,6 +20,13 @@ use super::heard::Heard;
 /// Smallest terminal that has room for verdict, advice, one chart and keys, columns and rows: a choice.
 const LEAST: (u16, u16) = (40, 12);
 
+/// Keys with their meaning, for the width that each text has: the first that fits is shown.
+const KEYS: [&str; 3] = [
+    "q quit   Tab next chart   Space freeze   b band   a axes   + - 0 zoom   c clear map   r redraw",
+    "q quit  Tab chart  Space freeze  b band  a axes  + - 0 zoom  c clear  r redraw",
+    "q quit  Tab chart  Space freeze  b band",
+];
+
 /// Draws the whole view; `frozen` says that the picture stands still.
 pub(crate) fn draw(frame: &mut Frame<'_>, heard: &Heard, choices: &Choices, palette: Palette, frozen: bool) {
     let area = frame.area();
@@ -40,10 +47,7 @@ pub(crate) fn draw(frame: &mut Frame<'_>, heard: &Heard, choices: &Choices, pale
         ..area
     };
     charts::draw(heard, choices, palette, body, buffer);
-    let text = if area.width < 80 {
-        "q quit  Tab chart  Space freeze  b band"
-    } else {
-        "q quit   Tab next chart   Space freeze   b band   a axes   + - 0 zoom   c clear map   r redraw"
-    };
+    let fits = |text: &&&str| text.len() <= usize::from(area.width);
+    let text = KEYS.iter().find(fits).copied().unwrap_or_default();
     put(keys, 0, text, palette.faint(), buffer);
 }
