@@ -291,6 +291,16 @@ fn the_lobe_chart_marks_the_working_point() {
         text.contains("margin: 0.50 mm below the limit of 1.50 mm"),
         "{text}"
     );
+    assert!(!text.contains("but it chatters"), "{text}");
+    heard.take(&Event::Report(Report {
+        speed: Some(Rpm(700.0)),
+        ..report(4000, Verdict::Hopf)
+    }));
+    let text = picture(&heard, &choices, (120, 24)).join("\n");
+    assert!(
+        text.contains("1.50 mm in the table; but it chatters: table or depth is wrong"),
+        "{text}"
+    );
 }
 
 #[test]

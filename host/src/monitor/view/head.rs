@@ -9,6 +9,7 @@ use super::frame::{put, wrapped};
 use super::letters::{self, Size};
 use super::palette::Palette;
 use crate::monitor::heard::{Connection, Heard, STRIP_S};
+use crate::monitor::lobes::Margin;
 use crate::report::words;
 
 /// Rows of a terminal from which margin and strip of verdicts are shown: a choice.
@@ -155,7 +156,7 @@ fn draw_large(heard: &Heard, palette: Palette, area: Rect, rows: u16, buffer: &m
 
 fn sentence(heard: &Heard) -> String {
     match (&heard.connection, &heard.report) {
-        (Connection::Gone(reason), _) => format!("waiting for {}: {reason}", heard.port),
+        (Connection::Gone(reason), _) => reason.clone(),
         (_, Some(report)) => words::verdict(&report.judgement),
         (Connection::Connecting, None) => format!("connecting to {}", heard.port),
         (Connection::Up, None) => "the device is connected and has sent no report yet".into(),
@@ -187,7 +188,12 @@ fn margin(heard: &Heard) -> String {
     let margin = match (&heard.lobes, heard.rpm()) {
         (None, _) => "not known without --table FILE.qct".into(),
         (_, None) => "not known without a speed".into(),
-        (Some(lobes), Some(rpm)) => lobes.margin(rpm).to_string(),
+        (Some(lobes), Some(rpm)) => match lobes.margin(rpm) {
+            margin @ (Margin::Below { .. } | Margin::Unlimited { .. }) if heard.chatter_hz().is_some() => {
+                format!("{margin}; but it chatters: table or depth is wrong")
+            }
+            margin => margin.to_string(),
+        },
     };
     format!("margin: {margin}{counts}")
 }
