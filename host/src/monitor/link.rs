@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use quietcut_core::protocol::{Info, Reports, Subscription};
 
-use super::heard::Identity;
+use super::received::Identity;
 use crate::device::{Client, DeviceError, Event};
 
 /// Longest wait for an event before the end of the program is checked: a choice.
@@ -106,14 +106,14 @@ fn session(
     client.subscribe(ALL)?;
     *was_up = true;
     let mut is_received = news.send(News::Up(identity)).is_ok();
-    let mut heard = Instant::now();
+    let mut last_event = Instant::now();
     while is_received && !stop.load(Ordering::Relaxed) {
         if let Some(event) = client.next_event(EVENT_TIMEOUT)? {
-            heard = Instant::now();
+            last_event = Instant::now();
             is_received = news.send(News::Event(Box::new(event))).is_ok();
-        } else if heard.elapsed() > SILENCE {
+        } else if last_event.elapsed() > SILENCE {
             client.subscribe(ALL)?;
-            heard = Instant::now();
+            last_event = Instant::now();
         }
     }
     client.subscribe(Subscription::default())?;

@@ -12,9 +12,9 @@ use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, KeyCode, KeyEventKind, KeyModifiers};
 
 use super::choices::Choices;
-use super::heard::Heard;
 use super::link::{self, News};
 use super::lobes::LobeMap;
+use super::received::Received;
 use super::view::{self, palette::Palette};
 use crate::device::{Client, DeviceError};
 use crate::report::answer::VerdictLog;
@@ -69,14 +69,14 @@ pub(crate) fn show(
     table: Option<Vec<u8>>,
     stop: &Arc<AtomicBool>,
 ) -> Result<Outcome, ScreenError> {
-    let mut heard = Heard::new(port);
-    heard.lobes = table.map(|bytes| LobeMap::new(bytes, None)).transpose()?;
+    let mut received = Received::new(port);
+    received.lobes = table.map(|bytes| LobeMap::new(bytes, None)).transpose()?;
     let mut terminal = ratatui::try_init()?;
     let (send, news) = sync_channel(WAITING_NEWS);
     let over = stop.clone();
     std::thread::spawn(move || link::listen(connect, &send, &over));
     let mut screen = Screen {
-        heard,
+        received,
         frozen: None,
         choices: Choices::default(),
         palette: Palette::of_environment(),
@@ -87,7 +87,7 @@ pub(crate) fn show(
     let _ = ratatui::try_restore();
     outcome?;
     Ok(Outcome {
-        log: screen.heard.log,
+        log: screen.received.log,
         lost_frames: goodbye(&news),
     })
 }
@@ -108,9 +108,9 @@ fn goodbye(news: &Receiver<News>) -> u32 {
 
 /// State of the view.
 struct Screen {
-    heard: Heard,
+    received: Received,
     /// Copy that is shown while the picture stands still.
-    frozen: Option<Box<Heard>>,
+    frozen: Option<Box<Received>>,
     choices: Choices,
     palette: Palette,
 }
@@ -138,7 +138,7 @@ impl Screen {
     }
 
     fn draw(&self, terminal: &mut DefaultTerminal) -> io::Result<()> {
-        let shown = self.frozen.as_deref().unwrap_or(&self.heard);
+        let shown = self.frozen.as_deref().unwrap_or(&self.received);
         let is_frozen = self.frozen.is_some();
         terminal.draw(|frame| view::draw(frame, shown, &self.choices, self.palette, is_frozen))?;
         Ok(())
@@ -159,10 +159,10 @@ impl Screen {
             KeyCode::Char(' ') => {
                 self.frozen = match self.frozen {
                     Some(_) => None,
-                    None => Some(Box::new(self.heard.clone())),
+                    None => Some(Box::new(self.received.clone())),
                 }
             }
-            KeyCode::Char('c') => self.heard.clear_map(),
+            KeyCode::Char('c') => self.received.clear_map(),
             KeyCode::Char('r') => terminal.clear()?,
             KeyCode::Tab => {
                 self.choices.take('\t');
@@ -181,11 +181,16 @@ impl Screen {
             match news.try_recv() {
                 Ok(News::Up(identity)) => {
                     let point = identity.working_point;
-                    self.heard.lobes = self.heard.lobes.take().map(|lobes| lobes.at(point)).transpose()?;
-                    self.heard.connected(identity);
+                    self.received.lobes = self
+                        .received
+                        .lobes
+                        .take()
+                        .map(|lobes| lobes.at(point))
+                        .transpose()?;
+                    self.received.connected(identity);
                 }
-                Ok(News::Event(event)) => self.heard.take(&event),
-                Ok(News::Gone(error)) => self.heard.gone(error.to_string()),
+                Ok(News::Event(event)) => self.received.take(&event),
+                Ok(News::Gone(error)) => self.received.gone(error.to_string()),
                 Ok(News::Failed(error)) => return Err(error.into()),
                 Ok(News::Ended(_)) => return Ok(()),
                 Err(TryRecvError::Empty) => return Ok(()),

@@ -15,9 +15,9 @@ use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 
 use super::choices::{Chart, Choices};
-use super::heard::{Connection, Heard, Identity};
 use super::link::{self, News};
 use super::lobes::{LobeMap, Margin};
+use super::received::{Connection, Identity, Received};
 use super::spectrum::Spectrum;
 use super::view::{self, palette::Palette};
 use crate::device::port::SerialLine;
@@ -54,34 +54,34 @@ fn chunk(first: u16, power: &[f32]) -> SpectrumChunk {
 }
 
 /// A device in chatter, with spectrum and map.
-fn in_chatter() -> Heard {
-    let mut heard = Heard::new("simulated");
-    heard.connected(Identity {
+fn in_chatter() -> Received {
+    let mut received = Received::new("simulated");
+    received.connected(Identity {
         name: "board 0.1.0".into(),
         teeth: 2,
         ..Identity::default()
     });
     let power: Vec<f32> = (0..96).map(|bin| if bin == 35 { 4.0 } else { 1e-4 }).collect();
-    heard.take(&Event::Spectrum(chunk(0, &power)));
-    heard.take(&Event::Spectrum(chunk(96, &[1e-4; 96])));
+    received.take(&Event::Spectrum(chunk(0, &power)));
+    received.take(&Event::Spectrum(chunk(96, &[1e-4; 96])));
     let strobes = (0..12).map(|tooth| Strobe {
         band: Band::Structure,
         tooth,
         meters_per_second2: [(tooth as f32).cos(), (tooth as f32).sin(), 0.0],
     });
-    heard.take(&Event::Strobes(StrobeChunk {
+    received.take(&Event::Strobes(StrobeChunk {
         sequence: 5,
         strobes: strobes.collect(),
     }));
-    heard.take(&Event::Report(report(900, Verdict::Stable)));
-    heard.take(&Event::Report(report(1600, Verdict::Hopf)));
-    heard
+    received.take(&Event::Report(report(900, Verdict::Stable)));
+    received.take(&Event::Report(report(1600, Verdict::Hopf)));
+    received
 }
 
-fn picture(heard: &Heard, choices: &Choices, (width, height): (u16, u16)) -> Vec<String> {
+fn picture(received: &Received, choices: &Choices, (width, height): (u16, u16)) -> Vec<String> {
     let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
     terminal
-        .draw(|frame| view::draw(frame, heard, choices, Palette::PLAIN, false))
+        .draw(|frame| view::draw(frame, received, choices, Palette::PLAIN, false))
         .unwrap();
     let buffer = terminal.backend().buffer().clone();
     let row = |y| (0..width).map(|x| buffer[(x, y)].symbol().to_owned()).collect();
@@ -90,9 +90,9 @@ fn picture(heard: &Heard, choices: &Choices, (width, height): (u16, u16)) -> Vec
 
 #[test]
 fn each_size_says_verdict_speed_and_keys() {
-    let heard = in_chatter();
+    let received = in_chatter();
     for size in [(120, 40), (80, 24), (40, 12)] {
-        let text = picture(&heard, &Choices::default(), size).join("\n");
+        let text = picture(&received, &Choices::default(), size).join("\n");
         for needed in [
             "CHATTER at 17.4 Hz",
             "advice",
@@ -104,9 +104,9 @@ fn each_size_says_verdict_speed_and_keys() {
             assert!(text.contains(needed), "{size:?}: {needed} is missing in\n{text}");
         }
     }
-    let narrow = picture(&heard, &Choices::default(), (40, 12)).join("\n");
+    let narrow = picture(&received, &Choices::default(), (40, 12)).join("\n");
     assert!(narrow.contains("1045"), "the speed is cut off in\n{narrow}");
-    let text = picture(&heard, &Choices::default(), (20, 5)).join("\n");
+    let text = picture(&received, &Choices::default(), (20, 5)).join("\n");
     assert!(
         text.contains("CHATTER 1045") && text.contains("min 40 x 12"),
         "{text}"
@@ -137,7 +137,7 @@ fn the_large_verdict_takes_an_eighth_of_the_rows() {
 fn no_size_and_no_state_panics() {
     let mut gone = in_chatter();
     gone.gone("the device is gone".into());
-    for heard in [Heard::new("/dev/ttyACM0"), in_chatter(), gone] {
+    for received in [Received::new("/dev/ttyACM0"), in_chatter(), gone] {
         for chart in [Chart::Spectrum, Chart::Map, Chart::Lobes, Chart::History] {
             let choices = Choices {
                 chart,
@@ -145,7 +145,7 @@ fn no_size_and_no_state_panics() {
             };
             for width in (0..130).step_by(3) {
                 for height in (0..50).step_by(2) {
-                    picture(&heard, &choices, (width, height));
+                    picture(&received, &choices, (width, height));
                 }
             }
         }
@@ -188,19 +188,19 @@ fn a_spectrum_with_a_lost_chunk_is_not_shown() {
 }
 
 #[test]
-fn a_lost_device_is_told_and_its_last_report_is_not_shown_as_live() {
-    let mut heard = in_chatter();
-    heard.gone("unplugged".into());
-    heard.gone("no such port".into());
-    let text = picture(&heard, &Choices::default(), (120, 40)).join("\n");
+fn a_lost_device_is_shown_and_its_last_report_is_not_shown_as_live() {
+    let mut received = in_chatter();
+    received.gone("unplugged".into());
+    received.gone("no such port".into());
+    let text = picture(&received, &Choices::default(), (120, 40)).join("\n");
     assert!(text.contains("CABLE PULLED, WAITING FOR simulated"), "{text}");
     assert!(!text.contains("CHATTER at 17.4 Hz, not synchronous with the teeth (Hopf)\nadvice"));
-    heard.connected(Identity::default());
-    assert_eq!(heard.connection, Connection::Up);
-    let told: Vec<&String> = heard.lines.iter().rev().take(2).collect();
+    received.connected(Identity::default());
+    assert_eq!(received.connection, Connection::Up);
+    let shown: Vec<&String> = received.lines.iter().rev().take(2).collect();
     assert!(
-        told[0].contains("is back") && told[1].contains("is gone"),
-        "{told:?}"
+        shown[0].contains("is back") && shown[1].contains("is gone"),
+        "{shown:?}"
     );
 }
 
@@ -268,17 +268,17 @@ fn the_margin_is_the_distance_to_the_next_limit_above() {
 
 #[test]
 fn the_lobe_chart_marks_the_working_point() {
-    let mut heard = in_chatter();
-    heard.take(&Event::Report(Report {
+    let mut received = in_chatter();
+    received.take(&Event::Report(Report {
         speed: Some(Rpm(700.0)),
         ..report(2000, Verdict::Stable)
     }));
-    heard.lobes = Some(lobes(Some(1.0)));
+    received.lobes = Some(lobes(Some(1.0)));
     let choices = Choices {
         chart: Chart::Lobes,
         ..Choices::default()
     };
-    let rows = picture(&heard, &choices, (60, 24));
+    let rows = picture(&received, &choices, (60, 24));
     let text = rows.join("\n");
     assert!(text.contains("lobes, ✚ 1.00 mm"), "{text}");
     let point = rows
@@ -292,11 +292,11 @@ fn the_lobe_chart_marks_the_working_point() {
         "{text}"
     );
     assert!(!text.contains("but it chatters"), "{text}");
-    heard.take(&Event::Report(Report {
+    received.take(&Event::Report(Report {
         speed: Some(Rpm(700.0)),
         ..report(4000, Verdict::Hopf)
     }));
-    let text = picture(&heard, &choices, (120, 24)).join("\n");
+    let text = picture(&received, &choices, (120, 24)).join("\n");
     assert!(
         text.contains("1.50 mm in the table; but it chatters: table or depth is wrong"),
         "{text}"
@@ -305,30 +305,30 @@ fn the_lobe_chart_marks_the_working_point() {
 
 #[test]
 fn a_text_that_does_not_fit_is_wrapped_or_says_that_it_is_cut() {
-    let mut heard = in_chatter();
+    let mut received = in_chatter();
     let choices = Choices {
         chart: Chart::History,
         ..Choices::default()
     };
-    heard.take(&Event::Report(report(3000, Verdict::PeriodDoubling)));
-    let text = picture(&heard, &choices, (40, 24)).join("\n");
+    received.take(&Event::Report(report(3000, Verdict::PeriodDoubling)));
+    let text = picture(&received, &choices, (40, 24)).join("\n");
     assert!(text.contains("doubling)"), "{text}");
-    let narrow = picture(&heard, &choices, (40, 12)).join("\n");
+    let narrow = picture(&received, &choices, (40, 12)).join("\n");
     assert!(narrow.contains('…'), "{narrow}");
 }
 
 #[test]
 fn the_strip_keeps_the_most_serious_verdict_of_a_cell() {
-    let mut heard = Heard::new("simulated");
+    let mut received = Received::new("simulated");
     for (t_ms, verdict) in [
         (0, Verdict::Stable),
         (100, Verdict::Hopf),
         (200, Verdict::Stable),
         (700, Verdict::AirCut),
     ] {
-        heard.take(&Event::Report(report(t_ms, verdict)));
+        received.take(&Event::Report(report(t_ms, verdict)));
     }
-    assert_eq!(heard.strip, [Some(Verdict::Hopf), Some(Verdict::AirCut)]);
+    assert_eq!(received.strip, [Some(Verdict::Hopf), Some(Verdict::AirCut)]);
 }
 
 /// A device without cuts on a pseudo-terminal: it answers all requests.
@@ -342,7 +342,7 @@ fn device() -> SimulatedDevice {
 }
 
 #[test]
-fn a_pulled_cable_is_told_and_the_device_is_taken_up_again() {
+fn a_pulled_cable_is_shown_and_the_device_is_connected_again() {
     let first = device();
     let mut paths = vec![device_path_gone(), first.path().to_owned()];
     let second = device();

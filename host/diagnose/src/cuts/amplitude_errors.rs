@@ -30,9 +30,11 @@ pub(crate) struct AmplitudeErrors {
     trend_whiteners: Vec<DMatrix<Complex64>>,
     /// Directions of the amplitudes of the record.
     directions: Vec<DMatrix<Complex64>>,
-    /// U, Uᵀ, and S².
+    /// U.
     principal: DMatrix<f64>,
+    /// Uᵀ, stored because nalgebra multiplies only stored matrices in cache blocks.
     principal_transposed: DMatrix<f64>,
+    /// S².
     squares: DVector<f64>,
     /// Z, of the directions of the amplitudes.
     turned: DMatrix<f64>,

@@ -202,7 +202,7 @@ fn extended<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut
             )
         });
         tracing::debug!(
-            gain = fitted.as_ref().map(|fitted| prior_of(best) + fitted.evidence() + prior[scored.index] - best.evidence),
+            gain = fitted.as_ref().map(|fitted| fitted.evidence() - best.fit.evidence() + prior[scored.index]),
             left = fitted.as_ref().map(|fitted| fitted.left / fitted.residual.len() as f64),
             z = ?fitted.as_ref().map(|fitted| &fitted.z[best.fit.z.len()..]),
             "fitted: {} {}",

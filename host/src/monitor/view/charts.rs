@@ -8,7 +8,7 @@ use super::frame::{framed, put, wrapped};
 use super::palette::Palette;
 use super::{lobes, map, spectrum};
 use crate::monitor::choices::{Chart, Choices};
-use crate::monitor::heard::Heard;
+use crate::monitor::received::Received;
 
 /// Least rows and columns of the four charts together: a choice that leaves each one 6 rows inside its frame.
 const FOUR: (u16, u16) = (100, 16);
@@ -17,14 +17,20 @@ const FOUR: (u16, u16) = (100, 16);
 const TWO: u16 = 70;
 
 /// Draws as many charts as there is room for.
-pub(super) fn draw(heard: &Heard, choices: &Choices, palette: Palette, area: Rect, buffer: &mut Buffer) {
+pub(super) fn draw(
+    received: &Received,
+    choices: &Choices,
+    palette: Palette,
+    area: Rect,
+    buffer: &mut Buffer,
+) {
     let sides =
         |area| Layout::horizontal([Constraint::Percentage(60), Constraint::Percentage(40)]).areas::<2>(area);
     let mut one = |chart, area| match chart {
-        Chart::Spectrum => spectrum::draw(heard, choices, palette, area, buffer),
-        Chart::Map => map::draw(heard, choices, palette, area, buffer),
-        Chart::Lobes => lobes::draw(heard, palette, area, buffer),
-        Chart::History => draw_history(heard, palette, area, buffer),
+        Chart::Spectrum => spectrum::draw(received, choices, palette, area, buffer),
+        Chart::Map => map::draw(received, choices, palette, area, buffer),
+        Chart::Lobes => lobes::draw(received, palette, area, buffer),
+        Chart::History => draw_history(received, palette, area, buffer),
     };
     if area.width >= FOUR.0 && area.height >= FOUR.1 {
         let [above, below] =
@@ -49,9 +55,9 @@ pub(super) fn draw(heard: &Heard, choices: &Choices, palette: Palette, area: Rec
 }
 
 /// The newest entries of the history, the newest at the top.
-fn draw_history(heard: &Heard, palette: Palette, area: Rect, buffer: &mut Buffer) {
+fn draw_history(received: &Received, palette: Palette, area: Rect, buffer: &mut Buffer) {
     let inside = framed(" history, newest first ", palette, area, buffer);
-    let lines = heard
+    let lines = received
         .lines
         .iter()
         .rev()

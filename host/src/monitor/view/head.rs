@@ -8,8 +8,8 @@ use ratatui::style::Style;
 use super::frame::{put, wrapped};
 use super::letters::{self, Size};
 use super::palette::Palette;
-use crate::monitor::heard::{Connection, Heard, STRIP_S};
 use crate::monitor::lobes::Margin;
+use crate::monitor::received::{Connection, Received, STRIP_S};
 use crate::report::words;
 
 /// Rows of a terminal from which margin and strip of verdicts are shown: a choice.
@@ -22,29 +22,35 @@ const ROWS_OF_REASON: u16 = 30;
 const GAP: u16 = 4;
 
 /// Draws the upper part; returns the number of rows that it takes.
-pub(super) fn draw(heard: &Heard, frozen: bool, palette: Palette, area: Rect, buffer: &mut Buffer) -> u16 {
-    put(area, 0, &title(heard, frozen), palette.title(), buffer);
+pub(super) fn draw(
+    received: &Received,
+    frozen: bool,
+    palette: Palette,
+    area: Rect,
+    buffer: &mut Buffer,
+) -> u16 {
+    put(area, 0, &title(received, frozen), palette.title(), buffer);
     let below = |rows: u16| Rect {
         y: area.y + rows,
         height: area.height.saturating_sub(rows),
         ..area
     };
-    let mut used = 1 + draw_large(heard, palette, below(1), area.height, buffer);
+    let mut used = 1 + draw_large(received, palette, below(1), area.height, buffer);
     let mut line = |text: &str, style: Style| {
         put(area, used, text, style, buffer);
         used += 1;
     };
-    line(&sentence(heard), palette.verdict(verdict(heard)));
-    line(&advice(heard), Style::new());
+    line(&sentence(received), palette.verdict(verdict(received)));
+    line(&advice(received), Style::new());
     if area.height >= ROWS_OF_ALL {
         // The reason may take two rows, which stay empty otherwise so that the charts do not jump.
         let rows = if area.height >= ROWS_OF_REASON { 2 } else { 1 };
-        let reason = wrapped(&reason(heard), area.width);
+        let reason = wrapped(&reason(received), area.width);
         for row in 0..rows {
             line(reason.get(row).map_or("", String::as_str), palette.faint());
         }
-        line(&margin(heard), Style::new());
-        draw_strip(heard, palette, below(used), buffer);
+        line(&margin(received), Style::new());
+        draw_strip(received, palette, below(used), buffer);
         used += 1;
     }
     used
@@ -52,22 +58,22 @@ pub(super) fn draw(heard: &Heard, frozen: bool, palette: Palette, area: Rect, bu
 
 /// Draws what a terminal too small for the view has room for.
 pub(super) fn draw_small(
-    heard: &Heard,
+    received: &Received,
     least: (u16, u16),
     palette: Palette,
     area: Rect,
     buffer: &mut Buffer,
 ) {
-    let style = palette.verdict(verdict(heard));
+    let style = palette.verdict(verdict(received));
     put(
         area,
         0,
-        &format!("{} {}", word(heard), speed(heard)),
+        &format!("{} {}", word(received), speed(received)),
         style,
         buffer,
     );
-    put(area, 1, &sentence(heard), Style::new(), buffer);
-    put(area, 2, &advice(heard), Style::new(), buffer);
+    put(area, 1, &sentence(received), Style::new(), buffer);
+    put(area, 2, &advice(received), Style::new(), buffer);
     let hint = format!("min {} x {}; q quits", least.0, least.1);
     put(
         area,
@@ -78,32 +84,32 @@ pub(super) fn draw_small(
     );
 }
 
-fn title(heard: &Heard, frozen: bool) -> String {
-    let state = match &heard.connection {
+fn title(received: &Received, frozen: bool) -> String {
+    let state = match &received.connection {
         Connection::Connecting => "connecting".into(),
-        Connection::Up if heard.report.is_none() => "connected, no report yet".into(),
+        Connection::Up if received.report.is_none() => "connected, no report yet".into(),
         Connection::Up => "live".into(),
-        Connection::Gone(_) => format!("CABLE PULLED, WAITING FOR {}", heard.port),
+        Connection::Gone(_) => format!("CABLE PULLED, WAITING FOR {}", received.port),
     };
-    let device = heard.identity.as_ref().map(|identity| {
+    let device = received.identity.as_ref().map(|identity| {
         let table = identity.table.as_deref().unwrap_or("no table");
         format!("  {}, {} teeth, {table}", identity.name, identity.teeth)
     });
     let frozen = if frozen { "FROZEN (Space goes on)  " } else { "" };
     format!(
         "{frozen}quietcut {}: {state}{}",
-        heard.port,
+        received.port,
         device.unwrap_or_default()
     )
 }
 
-fn verdict(heard: &Heard) -> Option<Verdict> {
-    Some(heard.report?.judgement.verdict)
+fn verdict(received: &Received) -> Option<Verdict> {
+    Some(received.report?.judgement.verdict)
 }
 
 /// Verdict in one word for the large letters.
-fn word(heard: &Heard) -> &'static str {
-    match (&heard.connection, verdict(heard)) {
+fn word(received: &Received) -> &'static str {
+    match (&received.connection, verdict(received)) {
         (Connection::Gone(_), _) => "GONE",
         (_, None) => "?",
         (_, Some(verdict)) => match verdict {
@@ -117,19 +123,21 @@ fn word(heard: &Heard) -> &'static str {
     }
 }
 
-fn speed(heard: &Heard) -> String {
-    heard.rpm().map_or_else(|| "?".into(), |rpm| format!("{rpm:.0}"))
+fn speed(received: &Received) -> String {
+    received
+        .rpm()
+        .map_or_else(|| "?".into(), |rpm| format!("{rpm:.0}"))
 }
 
 /// Draws verdict and speed in large letters; returns the number of rows.
-fn draw_large(heard: &Heard, palette: Palette, area: Rect, rows: u16, buffer: &mut Buffer) -> u16 {
+fn draw_large(received: &Received, palette: Palette, area: Rect, rows: u16, buffer: &mut Buffer) -> u16 {
     const UNIT: &str = "rev/min";
-    let (word, speed) = (word(heard), speed(heard));
+    let (word, speed) = (word(received), speed(received));
     // The size is that of the longest verdict, so that the picture does not jump when the verdict changes.
     let widest = format!("CHATTER {}", if speed.len() > 5 { "000000" } else { "00000" });
     let room = area.width.saturating_sub(UNIT.len() as u16 + GAP + 1);
     let size = Size::fitting(&widest, room, rows);
-    let style = palette.verdict(verdict(heard));
+    let style = palette.verdict(verdict(received));
     letters::draw(word, size, style, area, buffer);
     let from = size.columns("CHATTER") + GAP;
     let right = Rect {
@@ -154,42 +162,42 @@ fn draw_large(heard: &Heard, palette: Palette, area: Rect, rows: u16, buffer: &m
     size.rows()
 }
 
-fn sentence(heard: &Heard) -> String {
-    match (&heard.connection, &heard.report) {
+fn sentence(received: &Received) -> String {
+    match (&received.connection, &received.report) {
         (Connection::Gone(reason), _) => reason.clone(),
         (_, Some(report)) => words::verdict(&report.judgement),
-        (Connection::Connecting, None) => format!("connecting to {}", heard.port),
+        (Connection::Connecting, None) => format!("connecting to {}", received.port),
         (Connection::Up, None) => "the device is connected and has sent no report yet".into(),
     }
 }
 
-fn advice(heard: &Heard) -> String {
-    match heard.report.and_then(|report| report.advice) {
+fn advice(received: &Received) -> String {
+    match received.report.and_then(|report| report.advice) {
         Some(advice) => format!("advice: {}", words::action(&advice)),
         None => "advice: none".into(),
     }
 }
 
-fn reason(heard: &Heard) -> String {
-    let why = heard.report.and_then(|report| {
+fn reason(received: &Received) -> String {
+    let why = received.report.and_then(|report| {
         let advice = report.advice?;
         Some(words::why(&advice, &report.judgement, report.speed))
     });
     why.map_or_else(String::new, |why| format!("reason: {why}"))
 }
 
-fn margin(heard: &Heard) -> String {
-    let counts = match heard.report {
+fn margin(received: &Received) -> String {
+    let counts = match received.report {
         Some(report) if report.clipped > 0 || report.lost > 0 => {
             format!("; {} samples clipped, {} lost", report.clipped, report.lost)
         }
         _ => String::new(),
     };
-    let margin = match (&heard.lobes, heard.rpm()) {
+    let margin = match (&received.lobes, received.rpm()) {
         (None, _) => "not known without --table FILE.qct".into(),
         (_, None) => "not known without a speed".into(),
         (Some(lobes), Some(rpm)) => match lobes.margin(rpm) {
-            margin @ (Margin::Below { .. } | Margin::Unlimited { .. }) if heard.chatter_hz().is_some() => {
+            margin @ (Margin::Below { .. } | Margin::Unlimited { .. }) if received.chatter_hz().is_some() => {
                 format!("{margin}; but it chatters: table or depth is wrong")
             }
             margin => margin.to_string(),
@@ -213,12 +221,12 @@ fn letter(verdict: Option<Verdict>) -> char {
 }
 
 /// The verdicts of the last time as letters, the newest at the right.
-fn draw_strip(heard: &Heard, palette: Palette, area: Rect, buffer: &mut Buffer) {
+fn draw_strip(received: &Received, palette: Palette, area: Rect, buffer: &mut Buffer) {
     let head = "verdicts ";
     put(area, 0, head, palette.faint(), buffer);
     let legend = format!(" now  1 = {STRIP_S} s  .air q quiet H Hopf D doubling");
     let room = area.width.saturating_sub((head.len() + legend.len()) as u16);
-    let cells = heard.strip.iter().rev().take(usize::from(room));
+    let cells = received.strip.iter().rev().take(usize::from(room));
     let right = area.x + head.len() as u16 + room;
     for (back, verdict) in (1..).zip(cells) {
         if let Some(cell) = buffer.cell_mut((right.saturating_sub(back), area.y)) {

@@ -7,12 +7,12 @@ use ratatui::layout::Rect;
 
 use super::frame::{framed, put};
 use super::palette::Palette;
-use crate::monitor::heard::Heard;
 use crate::monitor::lobes::{LobeMap, letter};
+use crate::monitor::received::Received;
 
 /// Draws the lobes of the table around the working point.
-pub(super) fn draw(heard: &Heard, palette: Palette, area: Rect, buffer: &mut Buffer) {
-    let Some(lobes) = &heard.lobes else {
+pub(super) fn draw(received: &Received, palette: Palette, area: Rect, buffer: &mut Buffer) {
+    let Some(lobes) = &received.lobes else {
         let inside = framed(" lobes ", palette, area, buffer);
         put(
             inside,
@@ -43,7 +43,7 @@ pub(super) fn draw(heard: &Heard, palette: Palette, area: Rect, buffer: &mut Buf
         ..inside
     };
     draw_regions(lobes, palette, chart, buffer);
-    draw_point(heard, lobes, palette, chart, buffer);
+    draw_point(received, lobes, palette, chart, buffer);
     let [from, to] = lobes.rpm;
     let scale = format!(
         "{from:.0} to {to:.0} rev/min, 0 to {:.1} mm; H Hopf  D doubling",
@@ -74,8 +74,8 @@ fn draw_regions(lobes: &LobeMap, palette: Palette, chart: Rect, buffer: &mut Buf
 }
 
 /// The working point at the present speed: a cross, or a line without a depth.
-fn draw_point(heard: &Heard, lobes: &LobeMap, palette: Palette, chart: Rect, buffer: &mut Buffer) {
-    let ([from, to], Some(rpm)) = (lobes.rpm, heard.rpm()) else {
+fn draw_point(received: &Received, lobes: &LobeMap, palette: Palette, chart: Rect, buffer: &mut Buffer) {
+    let ([from, to], Some(rpm)) = (lobes.rpm, received.rpm()) else {
         return;
     };
     if !(from..=to).contains(&rpm) || to <= from {

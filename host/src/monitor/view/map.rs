@@ -11,15 +11,21 @@ use ratatui::widgets::canvas::{Canvas, Points};
 use super::frame::{framed, put};
 use super::palette::Palette;
 use crate::monitor::choices::{AXES, Choices};
-use crate::monitor::heard::Heard;
+use crate::monitor::received::Received;
 
 /// Smallest range of the map, m/s²: a choice above the noise of the sensor, which would fill the map otherwise.
 const LEAST_RANGE: f64 = 0.05;
 
 /// Draws the map of the chosen band and axes.
-pub(super) fn draw(heard: &Heard, choices: &Choices, palette: Palette, area: Rect, buffer: &mut Buffer) {
+pub(super) fn draw(
+    received: &Received,
+    choices: &Choices,
+    palette: Palette,
+    area: Rect,
+    buffer: &mut Buffer,
+) {
     let (across, up) = choices.axes;
-    let strobes = heard.strobes(choices.band);
+    let strobes = received.strobes(choices.band);
     let at = |strobe: &Strobe, axis: usize| {
         let value = strobe.meters_per_second2.get(axis).copied().unwrap_or_default();
         f64::from(value)

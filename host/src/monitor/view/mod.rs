@@ -1,4 +1,4 @@
-//! Draws what was heard: layout by the size of the terminal.
+//! Draws the received state: layout by the size of the terminal.
 
 mod charts;
 mod frame;
@@ -15,7 +15,7 @@ use ratatui::layout::Rect;
 use self::frame::put;
 use self::palette::Palette;
 use super::choices::Choices;
-use super::heard::Heard;
+use super::received::Received;
 
 /// Smallest terminal that has room for verdict, advice, one chart and keys, columns and rows: a choice.
 const LEAST: (u16, u16) = (40, 12);
@@ -28,11 +28,17 @@ const KEYS: [&str; 3] = [
 ];
 
 /// Draws the whole view; `frozen` says that the picture stands still.
-pub(crate) fn draw(frame: &mut Frame<'_>, heard: &Heard, choices: &Choices, palette: Palette, frozen: bool) {
+pub(crate) fn draw(
+    frame: &mut Frame<'_>,
+    received: &Received,
+    choices: &Choices,
+    palette: Palette,
+    frozen: bool,
+) {
     let area = frame.area();
     let buffer = frame.buffer_mut();
     if area.width < LEAST.0 || area.height < LEAST.1 {
-        head::draw_small(heard, LEAST, palette, area, buffer);
+        head::draw_small(received, LEAST, palette, area, buffer);
         return;
     }
     let keys = Rect {
@@ -40,13 +46,13 @@ pub(crate) fn draw(frame: &mut Frame<'_>, heard: &Heard, choices: &Choices, pale
         height: 1,
         ..area
     };
-    let used = head::draw(heard, frozen, palette, area, buffer);
+    let used = head::draw(received, frozen, palette, area, buffer);
     let body = Rect {
         y: area.y + used,
         height: area.height.saturating_sub(used + 1),
         ..area
     };
-    charts::draw(heard, choices, palette, body, buffer);
+    charts::draw(received, choices, palette, body, buffer);
     let fits = |text: &&&str| text.len() <= usize::from(area.width);
     let text = KEYS.iter().find(fits).copied().unwrap_or_default();
     put(keys, 0, text, palette.faint(), buffer);

@@ -6,7 +6,7 @@ use ratatui::layout::Rect;
 use super::frame::{band_name, framed, put};
 use super::palette::Palette;
 use crate::monitor::choices::Choices;
-use crate::monitor::heard::Heard;
+use crate::monitor::received::Received;
 
 /// Range of the bars below the largest one, dB: a choice; weaker lines are no cause of a verdict.
 const RANGE_DB: f64 = 50.0;
@@ -18,8 +18,14 @@ const EIGHTHS: [&str; 9] = [" ", "▁", "▂", "▃", "▄", "▅", "▆", "▇"
 const HARMONICS: f64 = 8.0;
 
 /// Draws the spectrum of the chosen band.
-pub(super) fn draw(heard: &Heard, choices: &Choices, palette: Palette, area: Rect, buffer: &mut Buffer) {
-    let spectrum = heard.spectrum(choices.band);
+pub(super) fn draw(
+    received: &Received,
+    choices: &Choices,
+    palette: Palette,
+    area: Rect,
+    buffer: &mut Buffer,
+) {
+    let spectrum = received.spectrum(choices.band);
     let band = band_name(choices.band);
     let title = format!(" spectrum, {band}, top {} ", peak_text(&spectrum.power));
     let inside = framed(&title, palette, area, buffer);
@@ -30,7 +36,7 @@ pub(super) fn draw(heard: &Heard, choices: &Choices, palette: Palette, area: Rec
         put(inside, 0, "no spectrum yet", palette.faint(), buffer);
         return;
     }
-    let end_hz = end_hz(heard, choices);
+    let end_hz = end_hz(received, choices);
     let bars = Rect {
         height: inside.height - 2,
         ..inside
@@ -41,8 +47,8 @@ pub(super) fn draw(heard: &Heard, choices: &Choices, palette: Palette, area: Rec
         bars,
         buffer,
     );
-    draw_marks(heard, end_hz, palette, inside, buffer);
-    draw_scale(heard, end_hz, palette, inside, buffer);
+    draw_marks(received, end_hz, palette, inside, buffer);
+    draw_scale(received, end_hz, palette, inside, buffer);
 }
 
 /// Amplitude of the largest bin as text.
@@ -52,21 +58,21 @@ fn peak_text(power: &[f32]) -> String {
 }
 
 /// End of the frequency scale, Hz: as chosen by zoom, else such that tooth passing and chatter are shown.
-fn end_hz(heard: &Heard, choices: &Choices) -> f64 {
-    let spectrum = heard.spectrum(choices.band);
+fn end_hz(received: &Received, choices: &Choices) -> f64 {
+    let spectrum = received.spectrum(choices.band);
     let whole = spectrum.end_hz();
     if let Some(zoom) = choices.zoom {
         return whole / f64::from(1_u32 << zoom);
     }
-    let tooth = tooth_hz(heard).unwrap_or(whole);
-    let chatter = heard.chatter_hz().unwrap_or_default();
+    let tooth = tooth_hz(received).unwrap_or(whole);
+    let chatter = received.chatter_hz().unwrap_or_default();
     (HARMONICS * tooth).max(2.0 * chatter).min(whole)
 }
 
 /// Tooth-passing frequency, Hz; `None` while the speed is unknown.
-fn tooth_hz(heard: &Heard) -> Option<f64> {
-    let teeth = f64::from(heard.identity.as_ref()?.teeth);
-    Some(heard.rpm()? / 60.0 * teeth)
+fn tooth_hz(received: &Received) -> Option<f64> {
+    let teeth = f64::from(received.identity.as_ref()?.teeth);
+    Some(received.rpm()? / 60.0 * teeth)
 }
 
 fn draw_bars(power: &[f32], palette: Palette, area: Rect, buffer: &mut Buffer) {
@@ -86,7 +92,7 @@ fn draw_bars(power: &[f32], palette: Palette, area: Rect, buffer: &mut Buffer) {
 }
 
 /// Marks below the bars: `T` a harmonic of the tooth passing, `·` one of the spindle, `▲` the chatter frequency.
-fn draw_marks(heard: &Heard, end_hz: f64, palette: Palette, inside: Rect, buffer: &mut Buffer) {
+fn draw_marks(received: &Received, end_hz: f64, palette: Palette, inside: Rect, buffer: &mut Buffer) {
     let width_hz = end_hz / f64::from(inside.width);
     let y = inside.bottom() - 2;
     let holds = |column: u16, step_hz: f64| {
@@ -94,16 +100,16 @@ fn draw_marks(heard: &Heard, end_hz: f64, palette: Palette, inside: Rect, buffer
         let harmonic = (from / step_hz).ceil().max(1.0) * step_hz;
         harmonic < from + width_hz
     };
-    let spindle = heard.rpm().map(|rpm| rpm / 60.0);
+    let spindle = received.rpm().map(|rpm| rpm / 60.0);
     for column in 0..inside.width {
-        let is_chatter = heard
+        let is_chatter = received
             .chatter_hz()
             .is_some_and(|chatter| (chatter / width_hz) as u16 == column);
         // Harmonics closer together than three columns are a bar that marks nothing.
         let is_of = |step: Option<f64>| step.is_some_and(|hz| hz > 3.0 * width_hz && holds(column, hz));
         let (mark, style) = if is_chatter {
             ("▲", palette.mark())
-        } else if is_of(tooth_hz(heard)) {
+        } else if is_of(tooth_hz(received)) {
             ("T", palette.title())
         } else if is_of(spindle) {
             ("·", palette.faint())
@@ -117,10 +123,10 @@ fn draw_marks(heard: &Heard, end_hz: f64, palette: Palette, inside: Rect, buffer
 }
 
 /// Ends of the frequency scale, and between them the meaning of the marks.
-fn draw_scale(heard: &Heard, end_hz: f64, palette: Palette, inside: Rect, buffer: &mut Buffer) {
+fn draw_scale(received: &Received, end_hz: f64, palette: Palette, inside: Rect, buffer: &mut Buffer) {
     let row = inside.height - 1;
     let end = format!("{end_hz:.0} Hz");
-    let legend = match heard.chatter_hz() {
+    let legend = match received.chatter_hz() {
         Some(chatter) => format!("0   ▲ chatter {chatter:.1} Hz  T tooth  · spindle"),
         None => "0   T tooth passing  · spindle".into(),
     };

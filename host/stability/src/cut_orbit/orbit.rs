@@ -26,9 +26,9 @@ const STEPS: usize = 20;
 /// Largest relative step of the displacement at the end of a search on a mesh that a finer one may resolve: events that
 /// lie in the surface near another event move by as much as the motion between the nodes errs.
 const RESOLVABLE: f64 = 1e-3;
-/// Largest number of events in a revolution: beyond, a motion is far from any orbit, or the dense equations of a Newton step,
-/// whose cost grows with the cube of the subintervals, take longer than a second.
-const MOST_EVENTS: usize = 64;
+/// Largest number of events in a revolution; beyond, a motion counts as far from any orbit. A mode that rings for ten periods
+/// after the entry of each of six teeth reverses 120 times. The cost of the dense equations grows with the cube of it.
+const MOST_EVENTS: usize = 128;
 /// Number of Newton steps without one of half the size of the smallest before, after which a search ends.
 const STALLED: usize = 7;
 /// Depth of the shallow cut from which an orbit is followed, as a share of that of the cut.

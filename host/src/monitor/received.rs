@@ -52,7 +52,7 @@ pub(crate) struct Identity {
 
 /// Everything that the device has sent so far.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Heard {
+pub(crate) struct Received {
     /// Name of the port.
     pub(crate) port: String,
     pub(crate) connection: Connection,
@@ -73,8 +73,8 @@ pub(crate) struct Heard {
     strip_end_s: f64,
 }
 
-impl Heard {
-    /// Nothing is heard yet from the device at `port`.
+impl Received {
+    /// Nothing is received yet from the device at `port`.
     pub(crate) fn new(port: &str) -> Self {
         Self {
             port: port.into(),
