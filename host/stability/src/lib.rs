@@ -100,7 +100,7 @@ pub use error::StabilityError;
 pub use frequency::problem::FrequencyProblem;
 pub use limits::cell::Cell;
 pub use limits::cell_chart::{CellChart, CellLine, cell_chart};
-pub use limits::chart::{Chart, Refinement, chart, counted_chart};
+pub use limits::chart::{Chart, Refinement, chart, counted_chart, first_limits};
 pub use limits::line::line;
 pub use limits::method::{Label, Method};
 pub use limits::plane::{Linearized, Plane};

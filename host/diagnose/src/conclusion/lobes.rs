@@ -11,14 +11,14 @@ use quietcut_stability::orbit::{ForcedProblem, collocation_of};
 use quietcut_stability::trial_cuts::{Call, Calls, TrialCut, call, calls};
 use quietcut_stability::{
     CubicTerms, Limit, Method, Pitched, SpeedLine, StabilityError, StabilityLoss, after, chart,
-    default_speeds, needs_orbit, spaced,
+    default_speeds, first_limits, needs_orbit, spaced,
 };
 
 /// Number of spindle speeds at equal ratios in a stability chart, to which those of recorded cuts are added.
 const SPEEDS: usize = 41;
 
-/// Number of spindle speeds at equal ratios in a stability chart whose limits take seconds each, as limits about forced
-/// orbits over a revolution do. Those of recorded cuts are added.
+/// Number of spindle speeds at equal ratios in a stability chart whose limits take long, as limits about forced orbits
+/// over a revolution do. Those of recorded cuts are added. Of such a chart only the first limits are computed.
 const FEW_SPEEDS: usize = 2;
 
 /// Largest number of spindle speeds at which [`depth_mm`] searches the lowest stability limit.
@@ -207,8 +207,8 @@ fn spread(
     let speeds_rpm: Vec<f64> = speeds.iter().map(|change| change.at_rpm).collect();
     let or_last = |limit_mm: Option<f64>| limit_mm.unwrap_or(searched_mm);
     let limits = |case: &Case| -> Result<Vec<f64>, StabilityError> {
-        let lines = chart(&*method(case, after_s)?, &speeds_rpm, searched_mm, 0)?;
-        let limits = lines.speeds.iter().map(|line| line.first_limit);
+        let lines = first_limits(&*method(case, after_s)?, &speeds_rpm, searched_mm)?;
+        let limits = lines.iter().map(|line| line.first_limit);
         Ok(limits
             .map(|limit| or_last(limit.map(|limit| limit.depth_mm)))
             .collect())
@@ -270,6 +270,8 @@ impl<'a> Cuts<'a> {
 struct Range {
     speeds_rpm: Vec<f64>,
     searched_mm: f64,
+    /// True if only the first limits are computed.
+    is_costly: bool,
 }
 
 impl Range {
@@ -283,22 +285,39 @@ impl Range {
         let speeds_rpm = speeds(case, cuts.tried, &cuts.recorded_rpm, count)?;
         let below_cuts_mm = BELOW_CUTS * cuts.all().map(|cut| cut.depth_mm).fold(0.0, f64::max);
         let searched_mm = if cuts.tried.is_empty() {
-            depth_mm(method, &speeds_rpm)?.max(below_cuts_mm)
+            let first_mm = if is_costly { below_cuts_mm } else { 0.0 };
+            depth_mm(method, &speeds_rpm, first_mm)?.max(below_cuts_mm)
         } else {
             below_cuts_mm
         };
         Ok(Self {
             speeds_rpm,
             searched_mm,
+            is_costly,
         })
     }
 }
 
 impl Chart {
     fn new(method: &dyn Method, range: &Range, cuts: &Cuts<'_>) -> Result<Self, StabilityError> {
-        let lines = chart(method, &range.speeds_rpm, range.searched_mm, 0)?.speeds;
+        let lines = if range.is_costly {
+            first_limits(method, &range.speeds_rpm, range.searched_mm)?
+        } else {
+            chart(method, &range.speeds_rpm, range.searched_mm, 0)?.speeds
+        };
         let mut said = calls(method, cuts.tried)?;
-        said.extend(cuts.recorded.iter().map(|cut| call(&lines, cut)));
+        let is_beyond = |cut: &TrialCut| {
+            let mut limits = lines.iter().filter(|line| line.rpm == cut.rpm);
+            limits.any(|line| {
+                line.first_limit
+                    .is_some_and(|limit| limit.depth_mm < cut.depth_mm)
+            })
+        };
+        if range.is_costly && cuts.recorded.iter().any(is_beyond) {
+            said.extend(calls(method, &cuts.recorded)?);
+        } else {
+            said.extend(cuts.recorded.iter().map(|cut| call(&lines, cut)));
+        }
         Ok(Self {
             method: method.name(),
             searched_mm: range.searched_mm,
@@ -399,13 +418,14 @@ fn speeds(
 }
 
 /// Largest axial depth of a stability chart, mm: [`DEPTH`] times the lowest stability limit over at most [`COARSE`] of
-/// the speeds, which is searched by doubling the depth; [`DEEPEST_MM`] if no limit is found.
-fn depth_mm(method: &dyn Method, speeds_rpm: &[f64]) -> Result<f64, StabilityError> {
+/// the speeds, which is searched by doubling the depth from `first_mm` or, if that is 0, from [`SHALLOWEST_MM`];
+/// [`DEEPEST_MM`] if no limit is found.
+fn depth_mm(method: &dyn Method, speeds_rpm: &[f64], first_mm: f64) -> Result<f64, StabilityError> {
     let every = speeds_rpm.len().div_ceil(COARSE).max(1);
     let coarse: Vec<f64> = speeds_rpm.iter().copied().step_by(every).collect();
-    let mut depth_mm = SHALLOWEST_MM;
+    let mut depth_mm = if first_mm > 0.0 { first_mm } else { SHALLOWEST_MM };
     while depth_mm < DEEPEST_MM {
-        let lines = chart(method, &coarse, depth_mm, 0)?.speeds;
+        let lines = first_limits(method, &coarse, depth_mm)?;
         let limits = lines.iter().filter_map(|line| line.first_limit);
         if let Some(lowest_mm) = limits.map(|limit| limit.depth_mm).min_by(f64::total_cmp) {
             return Ok(DEPTH * lowest_mm);
@@ -416,85 +436,4 @@ fn depth_mm(method: &dyn Method, speeds_rpm: &[f64]) -> Result<f64, StabilityErr
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use quietcut_stability::trial_cuts::Outcome;
-
-    /// The robot's case with an extension that changes all stiffness by this share.
-    fn stiffened(change: f64) -> Case {
-        let mut case = quietcut_testkit::case("kuka-kr90-acetal");
-        let mut table = toml::Table::new();
-        table.insert("relative_change".into(), change.into());
-        case.extensions.insert("stiffness".into(), table);
-        case
-    }
-
-    #[test]
-    fn intervals_of_limits_follow_from_intervals_of_parameters() {
-        let case = quietcut_testkit::case("kuka-kr90-acetal");
-        let between = |low: f64, high: f64| {
-            lobes(
-                &case,
-                &stiffened(0.1),
-                &[[stiffened(low), stiffened(high)]],
-                &[],
-                &[],
-            )
-            .unwrap()
-        };
-        let [low, high] = [0.06, 0.14].map(|change| between(change, change));
-        let found = between(0.06, 0.14);
-        for (at, change) in found.speeds.iter().enumerate() {
-            let center_mm = change.limit_after_mm.unwrap_or(found.searched_mm);
-            // If both ends of the parameters lie on one side of the estimate, the interval extends to that side only.
-            let [one, other] = [&low, &high].map(|ends| ends.speeds[at].limit_after_ci90_mm.unwrap());
-            let [from_mm, to_mm] = change.limit_after_ci90_mm.unwrap();
-            assert!(from_mm.unwrap() <= center_mm && to_mm.is_none_or(|to_mm| to_mm >= center_mm));
-            assert_eq!(from_mm, [one[0], other[0]].into_iter().flatten().reduce(f64::min));
-            let last = |limit_mm: Option<f64>| limit_mm.unwrap_or(f64::INFINITY);
-            assert_eq!(last(to_mm), last(one[1]).max(last(other[1])));
-        }
-        // Two independent principal directions with equal changes give an interval √2 as wide.
-        let moved = [stiffened(0.06), stiffened(0.14)];
-        let twice = lobes(&case, &stiffened(0.1), &[moved.clone(), moved], &[], &[]).unwrap();
-        let reach = |lobes: &Lobes| {
-            let Some([Some(from_mm), _]) = lobes.at.limit_after_ci90_mm else {
-                return 0.0;
-            };
-            lobes.at.limit_after_mm.unwrap_or(lobes.searched_mm) - from_mm
-        };
-        assert!(reach(&found) > 0.0);
-        assert!((reach(&twice) / reach(&found) - 2.0_f64.sqrt()).abs() < 1e-9);
-    }
-
-    #[test]
-    fn limits_without_an_interval_say_why() {
-        let case = quietcut_testkit::case("kuka-kr90-acetal");
-        let mut broken = stiffened(0.1);
-        broken.material = None;
-        let lobes = lobes(&case, &stiffened(0.1), &[[broken.clone(), broken]], &[], &[]).unwrap();
-        assert_eq!(lobes.at.limit_after_ci90_mm, None);
-        assert!(
-            lobes.warnings[0].starts_with("the 90 % intervals"),
-            "{:?}",
-            lobes.warnings
-        );
-    }
-
-    #[test]
-    fn without_an_extension_the_case_predicts_the_cuts() {
-        let case = quietcut_testkit::case("kuka-kr90-acetal");
-        // Chapter 7: the limit is 3.174 mm at 600 rev/min.
-        let cut = |depth_mm, outcome| TrialCut {
-            rpm: 600.0,
-            depth_mm,
-            outcome,
-            chatter_hz: None,
-        };
-        let cuts = [cut(2.5, Outcome::Stable), cut(3.0, Outcome::Chatter)];
-        let chart = baseline_lobes(&case, &[], &cuts).unwrap();
-        let calls: Vec<Call> = chart.cuts.iter().map(|(_, call)| *call).collect();
-        assert_eq!(calls, [Call::Right, Call::MissedChatter]);
-        assert_eq!(chart.searched_mm, BELOW_CUTS * 3.0);
-    }
-}
+mod tests;

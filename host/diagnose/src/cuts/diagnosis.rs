@@ -12,9 +12,10 @@ use crate::progress::Stage;
 use quietcut_model::case::Case;
 use quietcut_recording::{Recording, TestKind};
 
-/// Amplitude of a spectral line that is no order over that of the largest order of its channel, from which on the cut
-/// chatters: its motion is then not that of the forced orbit.
-const CHATTER: f64 = 0.2;
+/// Amplitude of a spectral line that is no order over that of the largest order of its channel, and its displacement over
+/// the feed per tooth, from which on the cut chatters: its motion is then not that of the forced orbit. Chatter grows until
+/// teeth leave the surface or nonlinear forces bound it; a mode that the scatter of tooth forces drives stays far below.
+const CHATTER: [f64; 2] = [0.2, 0.05];
 
 /// Root mean square of a modulation of the speed over that of all its wander from which on it is the modulation, and
 /// not one of the frequencies of a wandering speed.
@@ -46,7 +47,10 @@ pub(crate) fn diagnosed(
     for recording in recordings {
         let record = match (ReducedCut::new(&baseline, recording), recording.channel("tacho")) {
             (Ok(record), _) => record,
-            (Err(_), Some(_)) => return Ok(None),
+            (Err(error), Some(_)) => {
+                tracing::debug!(%error, "a cut cannot be reduced");
+                return Ok(None);
+            }
             // No other way reads a cut without tachometer.
             (Err(error), None) => return Err(error),
         };
@@ -69,7 +73,9 @@ pub(crate) fn diagnosed(
         };
         modulation.fluctuation.delta / 2.0_f64.sqrt() > least * wander
     });
-    if is_modulated || records.iter().any(|record| record.chatters(CHATTER)) {
+    let chatters = records.iter().any(|record| record.chatters(CHATTER));
+    if is_modulated || chatters {
+        tracing::debug!(is_modulated, chatters, "no steady forced motion");
         return Ok(None);
     }
     watch(Stage::Causes(1));
@@ -77,6 +83,7 @@ pub(crate) fn diagnosed(
         return Err(error);
     }
     let Some(explanations) = explain(&baseline, &records) else {
+        tracing::debug!("the baseline has no orbit");
         return Ok(None);
     };
     watch(Stage::Answer);

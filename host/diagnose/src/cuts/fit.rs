@@ -9,15 +9,21 @@ use super::record::ReducedCut;
 use super::space::{Space, Variable};
 use quietcut_numerics::statistics::chi_squared_quantile;
 
-/// Predicted decrease of χ² below which a fit has converged: a hundredth of a standard deviation of any variable.
-const CONVERGED: f64 = 1e-4;
+/// Predicted decrease of χ² below which a fit has converged: a tenth of a standard deviation of any variable; and as a
+/// share of the sum of squares, where the model is far from the records.
+const CONVERGED: [f64; 2] = [1e-2, 1e-6];
+/// The same where a step does not lower the sum of squares: orbits have an error of their own.
+const EXHAUSTED: [f64; 2] = [1e-1, 1e-5];
 /// Damping from which on a step that does not lower the cost ends a fit.
 const MOST_DAMPING: f64 = 50.0;
-/// Largest relative difference of the decrease of the cost from that predicted, up to which derivatives of an earlier
-/// step are trusted.
-const TRUSTED: f64 = 0.2;
+/// Decrease of the cost over that predicted, from which on derivatives of an earlier step are trusted.
+const TRUSTED: f64 = 0.5;
+/// Multiple of the decrease that its derivatives predict, below which no fit is taken to end.
+const HOPE: f64 = 3.0;
+/// Largest step of a coordinate of an effect, in its widths: no derivative reaches farther.
+pub(super) const REACH: f64 = 2.0;
 /// Largest number of steps, those that are too long included.
-const STEPS: usize = 20;
+const STEPS: usize = 40;
 
 /// One cut at a point of the space.
 struct State {
@@ -49,12 +55,17 @@ pub(crate) struct Fit {
 }
 
 impl Fit {
+    /// Sum of squares that a fit minimizes.
+    pub(crate) fn cost(&self) -> f64 {
+        self.left + self.prior
+    }
+
     /// Logarithm of the marginal likelihood by Laplace's method, but for a constant of the records.
     pub(crate) fn evidence(&self) -> f64 {
         let determinant = Cholesky::new(self.information.clone()).map_or(f64::INFINITY, |factor| {
             factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>()
         });
-        -0.5 * (self.left + self.prior) - determinant
+        -0.5 * self.cost() - determinant
     }
 
     /// Covariance of the variables.
@@ -223,16 +234,25 @@ fn stacked(states: &[State]) -> DVector<f64> {
     DVector::from_vec(all)
 }
 
+/// Sum of squares at a point of `space`, near an earlier fit of a part of it; `None` if no orbit exists there.
+pub(crate) fn cost_at(space: &Space<'_>, records: &[ReducedCut], z: &[f64], near: &Fit) -> Option<f64> {
+    let states = states(space, z, records, Some(&near.states))?;
+    Some(stacked(&states).norm_squared() + z.iter().map(|z| z * z).sum::<f64>())
+}
+
 /// Fits the variables of `space` to the records, from `start`; `near` is an earlier fit, of a part of the space. `None`
 /// if no orbit exists at the start.
 ///
-/// Derivatives by what is uncertain of the baseline hardly change, and most of the cost is theirs: they are those of the
-/// earlier fit and of earlier steps, until a step gains less or more than they promise, and at the end.
+/// Derivatives by what is uncertain of the baseline hardly change, and most of the computing time is theirs: they are
+/// those of the earlier fit and of earlier steps, until a step gains less than they promise, and at the end. A fit that
+/// would not come below the sum of squares `useful` with [`HOPE`] times the decrease that is predicted ends where it is,
+/// with the derivatives that it has.
 pub(crate) fn fit(
     space: &Space<'_>,
     records: &[ReducedCut],
     start: Vec<f64>,
     near: Option<&Fit>,
+    useful: f64,
 ) -> Option<Fit> {
     let mut z = start;
     let mut current = states(space, &z, records, near.map(|near| near.states.as_slice()))?;
@@ -259,7 +279,7 @@ pub(crate) fn fit(
         records,
         &current,
     );
-    for _ in 0..STEPS {
+    for taken in 0..STEPS {
         let residual = stacked(&current);
         let position = DVector::from_column_slice(&z);
         let cost = residual.norm_squared() + position.norm_squared();
@@ -268,7 +288,12 @@ pub(crate) fn fit(
         let Some((moved, predicted)) = step(space, &z, &normal, &gradient, damping) else {
             break;
         };
-        if predicted < CONVERGED {
+        if taken > 0 && cost - HOPE * predicted > useful {
+            exact = true;
+            break;
+        }
+        let is_below = |[least, share]: [f64; 2]| predicted < least.max(share * cost);
+        if is_below(CONVERGED) {
             if exact {
                 break;
             }
@@ -280,17 +305,27 @@ pub(crate) fn fit(
         let new_cost = next.as_ref().map_or(f64::INFINITY, |next| {
             stacked(next).norm_squared() + moved.iter().map(|z| z * z).sum::<f64>()
         });
+        tracing::trace!(
+            cost,
+            predicted,
+            new_cost,
+            damping,
+            exact,
+            from = ?&z[space.known()..],
+            to = ?&moved[space.known()..],
+            "step"
+        );
         if new_cost < cost {
             damping = (0.1 * damping).max(1e-9);
             let Some(next) = next else { break };
             (z, current) = (moved, next);
-            exact = ((cost - new_cost) / predicted - 1.0).abs() > TRUSTED;
+            exact = (cost - new_cost) / predicted < TRUSTED;
             let first = if exact { 0 } else { known };
             update(&mut slopes, first, space, &z, records, &current);
         } else if !exact {
             update(&mut slopes, 0, space, &z, records, &current);
             exact = true;
-        } else if damping > MOST_DAMPING {
+        } else if damping > MOST_DAMPING || is_below(EXHAUSTED) {
             break;
         } else {
             damping = (10.0 * damping).max(0.1);
@@ -348,8 +383,11 @@ fn step(
             held[index] = true;
             continue;
         }
+        let farthest = (space.known()..size)
+            .map(|index| change[index].abs())
+            .fold(REACH, f64::max);
         let moved: Vec<f64> = (0..size)
-            .map(|index| (z[index] + change[index]).max(space.lower(index)))
+            .map(|index| (z[index] + change[index] * REACH / farthest).max(space.lower(index)))
             .collect();
         let change = DVector::from_iterator(size, moved.iter().zip(z).map(|(moved, z)| moved - z));
         let predicted = 2.0 * gradient.dot(&change) - change.dot(&(normal * &change)) - change.norm_squared();

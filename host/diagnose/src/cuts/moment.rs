@@ -41,12 +41,16 @@ impl Moment {
         time_s: f64,
         near: Option<&Self>,
     ) -> Option<Self> {
-        let mut machine = space.machine(z, number, record, time_s)?;
+        let known = near.map(|near| &near.machine.reading);
+        let mut machine = space.machine(z, number, record, time_s, known)?;
+        // Where Newton's method does not follow from a known orbit, it may do so from rest.
         let orbit = match near {
-            // A step beyond which Newton's method does not follow is too long.
-            Some(near) => CutOrbit::near(&machine.model, &near.orbit),
+            Some(near) => {
+                CutOrbit::near(&machine.model, &near.orbit).or_else(|_| CutOrbit::new(&machine.model))
+            }
             None => CutOrbit::along_depth(&mut machine.model),
         }
+        .inspect_err(|error| tracing::trace!(%error, "no orbit"))
         .ok()?;
         let weights = orbit.order_weights(record.highest);
         let forces = orbit.force_orders(&weights);
@@ -54,7 +58,7 @@ impl Moment {
         let phase_rad = phase(space, z, number, record);
         turn(&mut coefficients, phase_rad);
         let jumps = orbit.jumps_of_engagement(&machine.model);
-        let [seen, by_phase] = seen(&machine, &jumps, &coefficients, record, phase_rad);
+        let [seen, by_phase] = seen(&machine, &jumps, &coefficients, record, phase_rad, &|_| true);
         Some(Self {
             jumps,
             seen,
@@ -81,20 +85,22 @@ impl Moment {
     ) -> Option<DMatrix<Complex64>> {
         let mut moved = z.to_vec();
         moved[index] += DIFFERENCE;
-        let plus = space.machine(&moved, number, record, time_s)?;
+        let known = Some(&self.machine.reading);
+        let plus = space.machine(&moved, number, record, time_s, known)?;
         let phase_rad = phase(space, z, number, record);
         // The moment may be that of a space without the effect of the variable, which is not absent at `z`.
         let own = match space.variables[index] {
-            Variable::Coordinate(..) => Some(space.machine(z, number, record, time_s)?),
+            Variable::Coordinate(..) => Some(space.machine(z, number, record, time_s, known)?),
             _ => None,
         };
         let own = own.as_ref().unwrap_or(&self.machine);
         let step = Complex64::from(DIFFERENCE);
         if space.is_of_reading(index) {
+            let is_read = |channel| plus.reading.differs(&own.reading, channel);
             let read = |machine: &Machine| {
                 let mut coefficients = machine.reading.orders(&self.forces);
                 turn(&mut coefficients, phase_rad);
-                let [seen, _] = seen(machine, &self.jumps, &coefficients, record, phase_rad);
+                let [seen, _] = seen(machine, &self.jumps, &coefficients, record, phase_rad, &is_read);
                 seen
             };
             return Some((read(&plus) - read(own)) / step);
@@ -108,13 +114,15 @@ impl Moment {
     }
 }
 
-/// Amplitudes of the channels as a record shows them, and their derivative by the phase of its tachometer.
+/// Amplitudes of the channels that are `read`, as a record shows them, and their derivative by the phase of its
+/// tachometer; zero for the others.
 fn seen(
     machine: &Machine,
     jumps: &[(f64, [f64; 3])],
     coefficients: &DMatrix<Complex64>,
     record: &ReducedCut,
     phase_rad: f64,
+    is_read: &dyn Fn(usize) -> bool,
 ) -> [DMatrix<Complex64>; 2] {
     let jumps: Vec<(f64, Vec<f64>)> = jumps
         .iter()
@@ -125,7 +133,7 @@ fn seen(
         .collect();
     let (rows, columns) = record.orders.amplitudes.shape();
     let mut found = [DMatrix::zeros(rows, columns), DMatrix::zeros(rows, columns)];
-    for channel in 0..columns {
+    for channel in (0..columns).filter(|channel| is_read(*channel)) {
         let of_channel: Vec<ChannelJump> = jumps
             .iter()
             .map(|(angle_rad, sizes)| ChannelJump {

@@ -1,6 +1,7 @@
 //! Orders of the channels of a cut under given forces.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use num_complex::Complex64;
@@ -12,15 +13,26 @@ use quietcut_simulate::effect::Pickup;
 use quietcut_stability::cut_orbit::ForceOrders;
 
 /// Channels of a machine, with the receptances between the tool and their sensors at the orders.
+#[derive(Clone)]
 pub(crate) struct Reading {
     pickups: Vec<Pickup>,
-    /// Receptance at the orders, by sensor place; the first is the tool.
-    places: Vec<Vec<Matrix3<Complex64>>>,
+    structure: FirstOrder,
+    /// The tool, then the places of sensors away from it.
+    places: Vec<Place>,
     /// Place of each channel.
     place_of: Vec<usize>,
     spindle_hz: f64,
     /// Sampling interval over which accelerations are means, s; 0 unless the velocity jumps with the force.
     mean_s: f64,
+}
+
+/// A place of the structure whose motion is read.
+#[derive(Clone)]
+struct Place {
+    /// [`Pickup::modes`].
+    modes: Vec<f64>,
+    /// Receptance between the tool and the place at the orders from 0.
+    receptances: Arc<Vec<Matrix3<Complex64>>>,
 }
 
 impl Reading {
@@ -32,41 +44,83 @@ impl Reading {
         highest: usize,
         rate_hz: f64,
     ) -> Option<Self> {
-        let receptances = |structure: &FirstOrder| -> Option<Vec<Matrix3<Complex64>>> {
-            (0..=highest)
-                .map(|order| structure.receptance(TAU * spindle_hz * order as f64))
-                .collect()
-        };
-        let mut places = vec![receptances(structure)?];
-        let mut known: Vec<Vec<f64>> = vec![Vec::new()];
-        let mut place_of = Vec::with_capacity(pickups.len());
-        for pickup in &pickups {
-            let place = match known.iter().position(|modes| *modes == pickup.modes) {
-                Some(place) => place,
-                None => {
-                    places.push(receptances(&structure.at_sensor(&pickup.modes))?);
-                    known.push(pickup.modes.clone());
-                    known.len() - 1
-                }
-            };
-            place_of.push(place);
-        }
-        Some(Self {
+        let mut reading = Self {
             pickups,
-            places,
-            place_of,
+            structure: structure.clone(),
+            places: Vec::new(),
+            place_of: Vec::new(),
             spindle_hz,
             mean_s: if structure.velocity_jumps() {
                 1.0 / rate_hz
             } else {
                 0.0
             },
-        })
+        };
+        reading.locate(highest)?;
+        Some(reading)
+    }
+
+    /// Other channels, which may be of another structure, at the same orders of the same record.
+    pub(crate) fn with(&self, structure: &FirstOrder, pickups: Vec<Pickup>, rate_hz: f64) -> Option<Self> {
+        let highest = self.places[0].receptances.len() - 1;
+        if *structure != self.structure {
+            return Self::new(structure, pickups, self.spindle_hz, highest, rate_hz);
+        }
+        let is_read = |place: &&Place| pickups.iter().any(|pickup| pickup.modes == place.modes);
+        let mut reading = Self {
+            places: self
+                .places
+                .iter()
+                .enumerate()
+                .filter(|(number, place)| *number == 0 || is_read(place))
+                .map(|(_, place)| place.clone())
+                .collect(),
+            place_of: Vec::new(),
+            structure: structure.clone(),
+            pickups,
+            spindle_hz: self.spindle_hz,
+            mean_s: self.mean_s,
+        };
+        reading.locate(highest)?;
+        Some(reading)
+    }
+
+    /// Finds the place of each channel, and computes the receptances of places that are not known.
+    fn locate(&mut self, highest: usize) -> Option<()> {
+        let at_tool: &[f64] = &[];
+        let sought = std::iter::once(at_tool).chain(self.pickups.iter().map(|pickup| &pickup.modes[..]));
+        for (number, modes) in sought.enumerate() {
+            let known = self.places.iter().position(|place| place.modes == modes);
+            let place = match known {
+                Some(place) => place,
+                None => {
+                    let moved = self.structure.at_sensor(modes);
+                    let receptances: Option<Vec<_>> = (0..=highest)
+                        .map(|order| moved.receptance(TAU * self.spindle_hz * order as f64))
+                        .collect();
+                    self.places.push(Place {
+                        modes: modes.to_vec(),
+                        receptances: Arc::new(receptances?),
+                    });
+                    self.places.len() - 1
+                }
+            };
+            if number > 0 {
+                self.place_of.push(place);
+            }
+        }
+        Some(())
+    }
+
+    /// True for a channel that another reading of the same orders reads otherwise: its place, axes, gain or dynamics
+    /// differ.
+    pub(crate) fn differs(&self, other: &Self, channel: usize) -> bool {
+        self.pickups[channel] != other.pickups[channel]
     }
 
     /// Fourier coefficients of each channel, orders × channels, in the unit of the channel.
     pub(crate) fn orders(&self, forces: &ForceOrders) -> DMatrix<Complex64> {
-        let highest = self.places[0].len().min(forces.cutting_n.nrows());
+        let highest = self.places[0].receptances.len().min(forces.cutting_n.nrows());
         DMatrix::from_fn(highest, self.pickups.len(), |order, channel| {
             let pickup = &self.pickups[channel];
             let s = Complex64::new(0.0, TAU * self.spindle_hz * order as f64);
@@ -74,7 +128,7 @@ impl Reading {
             let value = if pickup.quantity == Quantity::Force {
                 row(&forces.cutting_n)
             } else {
-                let moved = self.places[self.place_of[channel]][order] * row(&forces.structure_n);
+                let moved = self.places[self.place_of[channel]].receptances[order] * row(&forces.structure_n);
                 moved * s.powi(derivatives(pickup.quantity))
             };
             let read: Complex64 = pickup

@@ -13,7 +13,7 @@ use super::machine::Machine;
 use super::no_tachometer;
 use super::scatter;
 use super::wander;
-use crate::baseline::{Baseline, derivatives};
+use crate::baseline::{Baseline, derivatives, pickup_of};
 use crate::error::DiagnoseError;
 use crate::orders::circle::Circle;
 use crate::orders::reduction::{Orders, ReductionSettings};
@@ -160,10 +160,19 @@ impl ReducedCut {
         [-1.0, 1.0].map(|sign| self.conditions.time_s + sign * trend.scale_s)
     }
 
-    /// True if a spectral line of a channel of motion that is no order exceeds the share `least` of the largest order.
-    pub(crate) fn chatters(&self, least: f64) -> bool {
+    /// True if a spectral line of a channel of motion that is no order exceeds the share `of_order` of the largest order,
+    /// and its displacement the share `of_feed` of the feed per tooth.
+    pub(crate) fn chatters(&self, [of_order, of_feed]: [f64; 2]) -> bool {
+        let feed_m = 1e-3 * self.conditions.cut.feed_per_tooth_mm;
         self.orders.lines.iter().any(|line| {
-            let is_motion = !self.orders.channels[line.channel].starts_with('f');
+            let pickup = pickup_of(&self.orders.channels[line.channel]);
+            let Some(quantity) = pickup
+                .map(|pickup| pickup.quantity)
+                .filter(|of| *of != Quantity::Force)
+            else {
+                return false;
+            };
+            let displacement_m = line.amplitude / (TAU * line.frequency_hz).powi(derivatives(quantity));
             let is_hum = MAINS_HZ.iter().any(|mains_hz| {
                 let harmonic = (line.frequency_hz / mains_hz).round();
                 let nearest_hz = harmonic * mains_hz;
@@ -177,7 +186,7 @@ impl ReducedCut {
                 .skip(1)
                 .map(|amplitude| 2.0 * amplitude.norm())
                 .fold(0.0, f64::max);
-            is_motion && !is_hum && line.amplitude > least * largest
+            !is_hum && displacement_m > of_feed * feed_m && line.amplitude > of_order * largest
         })
     }
 

@@ -79,7 +79,7 @@ pub(super) fn of_restoring_force(along: Along, all: &mut Vec<Candidate>) {
     let positive = vec![Coordinate::POSITIVE; 2];
     all.push(
         Candidate::new(EffectName::SofteningHardening, place.clone(), positive, regimes)
-            .started_at(vec![vec![0.3, 0.3]]),
+            .started_at(vec![vec![FAINT, FAINT], vec![0.3, 0.3]]),
     );
     let friction = move |z: &[f64]| vec![("fc_n", damper_n * z[0])];
     all.push(

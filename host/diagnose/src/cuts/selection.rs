@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::candidate::Candidate;
 use super::candidates;
-use super::fit::{Fit, fit};
+use super::fit::{Fit, REACH, cost_at, fit};
 use super::record::ReducedCut;
 use super::space::Space;
 use crate::baseline::Baseline;
@@ -13,6 +13,11 @@ use quietcut_model::effects::{Class, EffectName};
 
 /// Number of candidates that are fitted, of those that the baseline's derivatives rank first.
 const FITTED: usize = 8;
+/// Number of starts of a candidate that are compared with the records, of those that the derivatives rank first.
+const COMPARED: usize = 4;
+/// Difference in the logarithm of the probability from the first candidate from which on no fit need be exact: it does
+/// not change an answer.
+const OUT_OF_REACH: f64 = 30.0;
 /// Largest number of effects.
 const EFFECTS: usize = 3;
 /// Least gain of a further effect in the logarithm of its probability: odds of 100, so that one of 100 sets of
@@ -43,7 +48,7 @@ pub(crate) struct Explanations<'a> {
 pub(crate) fn explain<'a>(baseline: &'a Baseline<'a>, records: &[ReducedCut]) -> Option<Explanations<'a>> {
     let space = Space::new(baseline, records);
     let start = vec![0.0; space.variables.len()];
-    let fitted = fit(&space, records, start, None)?;
+    let fitted = fit(&space, records, start, None, f64::INFINITY)?;
     let all = candidates::all(baseline, records, &fitted);
     let written = baseline
         .case
@@ -90,7 +95,8 @@ pub(crate) fn as_written<'a>(baseline: &'a Baseline<'a>, records: &[ReducedCut])
         true => space.as_written(),
         false => space,
     };
-    let fit = fit(&space, records, vec![0.0; space.variables.len()], None)?;
+    let start = vec![0.0; space.variables.len()];
+    let fit = fit(&space, records, start, None, f64::INFINITY)?;
     Some(Explanation {
         evidence: fit.evidence(),
         space,
@@ -107,7 +113,7 @@ fn reduced<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut]
     let prior = priors(all);
     let without = |number: usize| {
         let (space, start) = best.space.without(number, &best.fit.z);
-        let fitted = fit(&space, records, start, Some(&best.fit))?;
+        let fitted = fit(&space, records, start, Some(&best.fit), f64::INFINITY)?;
         let known: f64 = space
             .candidates
             .iter()
@@ -165,17 +171,16 @@ fn extended<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut
         })
         .collect();
     scored.sort_by(|a, b| b.gain.total_cmp(&a.gain).then(a.index.cmp(&b.index)));
-    let mut seen: Vec<usize> = Vec::new();
-    scored.retain(|scored| {
-        let is_new = !seen.contains(&scored.index);
-        if is_new {
-            seen.push(scored.index);
+    let mut ranked: Vec<Vec<Scored>> = Vec::new();
+    for scored in scored {
+        match ranked.iter_mut().find(|known| known[0].index == scored.index) {
+            Some(known) => known.push(scored),
+            None => ranked.push(vec![scored]),
         }
-        is_new
-    });
-    for (place, scored) in scored.iter().enumerate() {
-        let candidate = &all[scored.index];
-        let Scored { gain, start, .. } = scored;
+    }
+    for (place, scored) in ranked.iter().enumerate() {
+        let candidate = &all[scored[0].index];
+        let Scored { gain, start, .. } = &scored[0];
         tracing::debug!(
             place,
             gain,
@@ -185,41 +190,101 @@ fn extended<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut
             candidate.location
         );
     }
-    scored.truncate(FITTED);
-    let fitted = |scored: Scored| {
-        let candidate = &all[scored.index];
+    ranked.truncate(FITTED);
+    let fitted = |starts: Vec<Scored>, useful: f64| {
+        let index = starts[0].index;
+        let candidate = &all[index];
         let space = best.space.with(candidate);
-        // Where derivatives reach too far, there is no orbit near that of `best`: the start is then nearer.
-        let fitted = (0..NEARER_STARTS).find_map(|halvings| {
-            let share = 0.5_f64.powi(halvings);
-            let near = scored.at.iter().zip(&scored.start);
-            let start = near.map(|(at, start)| at + share * (start - at));
-            fit(
-                &space,
-                records,
-                best.fit.z.iter().copied().chain(start).collect(),
-                Some(&best.fit),
-            )
-        });
+        // The first of the ranking is fitted from two starts.
+        let count = if useful.is_finite() { 1 } else { 2 };
+        let found = nearest_starts(best, &space, records, starts, count)
+            .into_iter()
+            .filter_map(|start| fit(&space, records, start, Some(&best.fit), useful))
+            .max_by(|a, b| a.evidence().total_cmp(&b.evidence()));
         tracing::debug!(
-            gain = fitted.as_ref().map(|fitted| fitted.evidence() - best.fit.evidence() + prior[scored.index]),
-            left = fitted.as_ref().map(|fitted| fitted.left / fitted.residual.len() as f64),
-            z = ?fitted.as_ref().map(|fitted| &fitted.z[best.fit.z.len()..]),
+            gain = found.as_ref().map(|found| found.evidence() - best.fit.evidence() + prior[index]),
+            left = found.as_ref().map(|found| found.left / found.residual.len() as f64),
+            z = ?found.as_ref().map(|found| &found.z[best.fit.z.len()..]),
             "fitted: {} {}",
             candidate.effect.name(),
             candidate.location
         );
-        let fitted = fitted?;
+        let found = found?;
         Some(Explanation {
-            evidence: prior_of(best) + fitted.evidence() + prior[scored.index],
+            evidence: prior_of(best) + found.evidence() + prior[index],
             space,
-            fit: fitted,
+            fit: found,
         })
     };
-    let mut found: Vec<Explanation<'a>> = scored.into_par_iter().filter_map(fitted).collect();
+    // The first of the ranking tells which of the others are worth an exact fit; where nothing ranks a candidate, so does
+    // the next.
+    let is_ranked = |starts: &Vec<Scored>| starts[0].gain.is_finite();
+    let first = ranked
+        .iter()
+        .position(is_ranked)
+        .map_or(ranked.len(), |first| first + 1);
+    let others = ranked.split_off(first);
+    let mut found: Vec<Explanation<'a>> = ranked
+        .into_par_iter()
+        .filter_map(|starts| fitted(starts, f64::INFINITY))
+        .collect();
+    let least = found
+        .iter()
+        .map(|set| set.fit.cost())
+        .fold(f64::INFINITY, f64::min);
+    let useful = least + 2.0 * OUT_OF_REACH;
+    found.par_extend(others.into_par_iter().filter_map(|starts| fitted(starts, useful)));
     found.retain(|set| !hides_softening_hardening(set));
     found.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
     found
+}
+
+/// Of the starts of a candidate those from which its fits begin, at most `count`: where the derivatives do not tell which
+/// shape is best, the records are compared with the first [`COMPARED`] of their ranking.
+fn nearest_starts(
+    best: &Explanation<'_>,
+    space: &Space<'_>,
+    records: &[ReducedCut],
+    mut starts: Vec<Scored>,
+    count: usize,
+) -> Vec<Vec<f64>> {
+    starts.truncate(COMPARED);
+    let mut compared: Vec<(f64, Vec<f64>)> = starts
+        .par_iter()
+        .filter_map(|scored| nearest_start(best, space, records, scored))
+        .collect();
+    compared.sort_by(|a, b| a.0.total_cmp(&b.0));
+    compared.truncate(count);
+    compared.into_iter().map(|(_, z)| z).collect()
+}
+
+/// The start of a fit, with its sum of squares. Where derivatives reach too far, the records agree less than without the
+/// effect, or there is no orbit near that of `best`: the start is then nearer.
+fn nearest_start(
+    best: &Explanation<'_>,
+    space: &Space<'_>,
+    records: &[ReducedCut],
+    scored: &Scored,
+) -> Option<(f64, Vec<f64>)> {
+    let at = |halvings: i32| -> Vec<f64> {
+        let share = 0.5_f64.powi(halvings);
+        let near = scored.at.iter().zip(&scored.start);
+        let start = near.map(|(at, start)| at + share * (start - at));
+        best.fit.z.iter().copied().chain(start).collect()
+    };
+    let mut nearest: Option<(f64, Vec<f64>)> = None;
+    for z in (0..NEARER_STARTS).map(at) {
+        let Some(cost) = cost_at(space, records, &z, &best.fit) else {
+            continue;
+        };
+        if nearest.as_ref().is_none_or(|(least, _)| cost < *least) {
+            nearest = Some((cost, z));
+        }
+        if cost < best.fit.cost() {
+            break;
+        }
+    }
+    nearest
 }
 
 /// A candidate with the gain in evidence that the derivatives predict, and the coordinates where its fit begins.
@@ -296,7 +361,17 @@ fn score(
     let gradient = columns.tr_mul(&best.fit.residual)
         - mixed.tr_mul(&factor.solve(&(best.fit.jacobian.tr_mul(&best.fit.residual) - position(best))));
     let start_z = DVector::from_column_slice(start);
-    let gradient = gradient - &start_z;
+    // What the records do not move stays at its start: the shape of an effect that is faint.
+    let gradient = DVector::from_iterator(
+        start.len(),
+        (0..start.len()).map(|index| {
+            if columns.column(index).amax() == 0.0 {
+                0.0
+            } else {
+                gradient[index] - start_z[index]
+            }
+        }),
+    );
     let own = columns.tr_mul(&columns) - mixed.tr_mul(&factor.solve(&mixed));
     let information: DMatrix<f64> = own + DMatrix::identity(start.len(), start.len());
     let own_factor = Cholesky::new(information)?;
@@ -324,9 +399,7 @@ fn score(
 }
 
 /// Number of starts of a fit, each half as far from where derivatives are taken as that before.
-const NEARER_STARTS: i32 = 5;
-/// Farthest start of a fit, in widths: a derivative at the baseline does not reach farther.
-const REACH: f64 = 2.0;
+const NEARER_STARTS: i32 = 6;
 
 fn position(best: &Explanation<'_>) -> DVector<f64> {
     DVector::from_column_slice(&best.fit.z)

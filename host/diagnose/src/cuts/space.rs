@@ -229,13 +229,14 @@ impl<'a> Space<'a> {
     }
 
     /// The machine at a point of the space in the cut `number`, at a time from the start of its record; `None` if it is
-    /// not possible.
+    /// not possible. `near` reads the same record.
     pub(crate) fn machine(
         &self,
         z: &[f64],
         number: usize,
         record: &ReducedCut,
         time_s: f64,
+        near: Option<&Reading>,
     ) -> Option<Machine> {
         let case = self.case(z)?;
         let effects = self.baseline.effects.clone().and(&self.effects(z).ok()?);
@@ -276,13 +277,11 @@ impl<'a> Space<'a> {
                 Some(pickup)
             })
             .collect::<Option<Vec<_>>>()?;
-        let reading = Reading::new(
-            &model.structure,
-            pickups,
-            conditions.spindle_hz,
-            record.highest,
-            record.rate_hz,
-        )?;
+        let (structure, rate_hz) = (&model.structure, record.rate_hz);
+        let reading = match near {
+            Some(near) => near.with(structure, pickups, rate_hz)?,
+            None => Reading::new(structure, pickups, conditions.spindle_hz, record.highest, rate_hz)?,
+        };
         Some(Machine { model, reading })
     }
 }

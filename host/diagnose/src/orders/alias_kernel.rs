@@ -36,7 +36,16 @@ pub(crate) struct AliasKernel {
     aliases: usize,
     /// a(p) for p = 0 … 2P.
     kernel: Vec<Complex64>,
-    /// Density ρ of the samples over the spindle angle, truncated to |p| ≤ 2P, on an even grid.
+    /// Products with functions of |l| ≤ P.
+    of_aliases: Convolution,
+    /// Products with functions of |l| ≤ K.
+    of_orders: Convolution,
+}
+
+/// Products of functions of |l| ≤ L with the density of the samples over the spindle angle, in their orders |k| ≤ L.
+#[derive(Clone)]
+struct Convolution {
+    /// Density ρ, truncated to |p| ≤ 2L, on an even grid.
     density: Vec<f64>,
     forward: Arc<dyn RealToComplex<f64>>,
     inverse: Arc<dyn ComplexToReal<f64>>,
@@ -54,19 +63,13 @@ impl AliasKernel {
         for entry in &mut kernel {
             *entry /= taper.sum();
         }
-        // The product of ρ (|p| ≤ 2P) and a function (|l| ≤ P) reaches to 3P; on a grid of more than 4P points its
-        // orders |k| ≤ P are free of aliases.
-        let points = smooth_even(4 * aliases + 2);
         let mut planner = RealFftPlanner::new();
-        let (forward, inverse) = (planner.plan_fft_forward(points), planner.plan_fft_inverse(points));
-        let density = to_angle(&*inverse, &kernel);
         Self {
             orders,
             aliases,
+            of_aliases: Convolution::new(&kernel, aliases, &mut planner),
+            of_orders: Convolution::new(&kernel, orders, &mut planner),
             kernel,
-            density,
-            forward,
-            inverse,
         }
     }
 
@@ -89,7 +92,7 @@ impl AliasKernel {
     /// e^{ikθ}, given by its coefficients c_k, k = 0 …; those above P are left out.
     pub(crate) fn seen(&self, c: &[Complex64]) -> Vec<Complex64> {
         let c = &c[..c.len().min(self.aliases + 1)];
-        let b = self.product(c, self.orders);
+        let b = self.of_aliases.product(c, self.orders);
         self.solve(&b)
     }
 
@@ -103,6 +106,11 @@ impl AliasKernel {
     /// variance, are added to the diagonal; none for the orders beyond the list.
     pub(crate) fn solve_with_prior(&self, right: &[Complex64], penalties: &[f64]) -> Vec<Complex64> {
         let highest = right.len() - 1;
+        let convolution = if highest > self.orders {
+            &self.of_aliases
+        } else {
+            &self.of_orders
+        };
         let mut x = vec![Complex64::ZERO; right.len()];
         let mut residual = right.to_vec();
         let mut direction = residual.clone();
@@ -112,7 +120,7 @@ impl AliasKernel {
             if square <= SETTLED * SETTLED * whole {
                 break;
             }
-            let mut product = self.product(&direction, highest);
+            let mut product = convolution.product(&direction, highest);
             for ((product, direction), penalty) in product.iter_mut().zip(&direction).zip(penalties) {
                 *product += direction * penalty;
             }
@@ -132,6 +140,21 @@ impl AliasKernel {
             square = next;
         }
         x
+    }
+}
+
+impl Convolution {
+    /// Products in orders up to `highest` with a kernel a(p), p = 0 … 2 × `highest` or more.
+    fn new(kernel: &[Complex64], highest: usize, planner: &mut RealFftPlanner<f64>) -> Self {
+        // The product of ρ (|p| ≤ 2L) and a function (|l| ≤ L) reaches to 3L; on a grid of more than 4L points its
+        // orders |k| ≤ L are free of aliases.
+        let points = smooth_even(4 * highest + 2);
+        let (forward, inverse) = (planner.plan_fft_forward(points), planner.plan_fft_inverse(points));
+        Self {
+            density: to_angle(&*inverse, &kernel[..=2 * highest]),
+            forward,
+            inverse,
+        }
     }
 
     /// Σ_l a(k − l) c_l for k = 0 … `highest`, of a real signal.

@@ -59,6 +59,19 @@ pub fn chart<M: Method + ?Sized>(
     Ok(Chart::of_lines(method, lines))
 }
 
+/// Lines of a chart up to the first limit of each speed, which may take less time than [`chart()`]: depths beyond it may
+/// be missing.
+///
+/// # Errors
+/// As [`chart()`].
+pub fn first_limits<M: Method + ?Sized>(
+    method: &M,
+    speeds_rpm: &[f64],
+    depth_mm: f64,
+) -> Result<Vec<SpeedLine>, StabilityError> {
+    method.up_to_first_limits(speeds_rpm, depth_mm, CHART_SAMPLES_MIN)
+}
+
 /// Computes a stability chart as [`chart()`] with the limits of each speed on their own, and calls `after_each` after each
 /// speed: for a method that needs seconds a speed.
 ///

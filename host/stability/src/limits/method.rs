@@ -79,6 +79,20 @@ pub trait Method: Sync {
     ) -> Result<Vec<SpeedLine>, StabilityError> {
         each_line(self, speeds_rpm, depth_mm, samples, || ())
     }
+
+    /// The parts of [`lines()`](Self::lines) that hold the first limits, where that takes less time: depths beyond the
+    /// first limit of a speed may be missing.
+    ///
+    /// # Errors
+    /// As [`line()`](Self::line), for the first speed that fails.
+    fn up_to_first_limits(
+        &self,
+        speeds_rpm: &[f64],
+        depth_mm: f64,
+        samples: usize,
+    ) -> Result<Vec<SpeedLine>, StabilityError> {
+        self.lines(speeds_rpm, depth_mm, samples)
+    }
 }
 
 /// Limits of a method at each spindle speed (rev/min) on its own, in the given order; calls `after_each` after each speed.

@@ -1,5 +1,7 @@
 //! Stability method of structures whose limits depend on the forced orbit, for charts and single cuts.
 
+use rayon::prelude::*;
+
 use super::branch::{Branch, Event, Extent};
 use super::branch_record::Unrecorded;
 use super::branches::{follow_depth, multiplier_at};
@@ -60,6 +62,22 @@ impl Method for ForcedProblem {
         line.bistable_mm.extend(below);
         line.bistable_mm.sort_by(|a, b| a[0].total_cmp(&b[0]));
         Ok(line)
+    }
+
+    fn up_to_first_limits(
+        &self,
+        speeds_rpm: &[f64],
+        depth_mm: f64,
+        _samples: usize,
+    ) -> Result<Vec<SpeedLine>, StabilityError> {
+        let line = |rpm: &f64| {
+            let branch = follow_depth(self, *rpm, depth_mm, Extent::FirstLoss);
+            branch
+                .map(|branch| branch.speed_line())
+                .map_err(|cause| broke_down(*rpm, depth_mm, cause))
+        };
+        let lines: Vec<_> = speeds_rpm.par_iter().map(line).collect();
+        lines.into_iter().collect()
     }
 }
 
