@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nalgebra::Matrix3;
 
-use crate::answer::Figure;
+use crate::answer::{Figure, Outcome};
 use crate::records::study::Study;
 use crate::tests::virtual_records::record;
 use crate::{Diagnosis, Options, diagnose};
