@@ -11,6 +11,7 @@ use quietcut_core::protocol::{Reports, Subscription};
 use super::port::PortArgs;
 use super::{Error, StreamedOutput, positive};
 use crate::device::{Client, Event};
+use crate::monitor::live::LiveError;
 use crate::monitor::screen::{self, ScreenError};
 use crate::report::answer::VerdictLog;
 use crate::report::words;
@@ -87,15 +88,25 @@ fn draw(args: &Args, stop: &Arc<AtomicBool>) -> Result<(), Error> {
     let connect = args.port.connector()?;
     let table = args.table.as_deref().map(crate::file::read).transpose()?;
     let outcome = screen::show(args.port.name(), connect, table, stop).map_err(|error| match error {
-        ScreenError::Device(cause) => cause.into(),
-        ScreenError::Table(cause) => Error::input(format!(
-            "{}: {cause}",
-            args.table.as_deref().unwrap_or("--table".as_ref()).display()
-        )),
+        ScreenError::Live(cause) => args.live_error(cause),
         other => Error::other(other),
     })?;
     warn_of_lost(outcome.lost_frames);
     args.output.end(&[], &outcome.log, &outcome.log.summary)
+}
+
+impl Args {
+    /// Converts the reason why the state of the device cannot be shown; a table is named by its file.
+    fn live_error(&self, error: LiveError) -> Error {
+        match error {
+            LiveError::Device(cause) => cause.into(),
+            LiveError::Table(cause) => {
+                let file = self.table.as_deref().unwrap_or("--table".as_ref());
+                Error::input(format!("{}: {cause}", file.display()))
+            }
+            silent @ LiveError::Silent => Error::other(silent),
+        }
+    }
 }
 
 fn warn_of_lost(frames: u32) {
