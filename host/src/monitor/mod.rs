@@ -1,4 +1,4 @@
-//! `monitor` as a picture on a terminal, which is drawn anew a few times a second.
+//! `monitor` as a picture on a terminal, which is drawn anew a few times a second, and as a page in a browser.
 //!
 //! | file | content |
 //! |---|---|
@@ -11,16 +11,18 @@
 //! | `choices` | the view that the user has chosen by keys |
 //! | `view` | draws the received state |
 //! | `screen` | the loop over news, keys and pictures |
+//! | `web` | the page |
 
 mod choices;
 mod link;
 pub(crate) mod live;
 mod lobes;
-mod received;
+pub(crate) mod received;
 pub(crate) mod screen;
 mod sentences;
 mod spectrum;
 mod view;
+pub(crate) mod web;
 
 #[cfg(test)]
 mod tests;

@@ -67,6 +67,8 @@ pub(crate) struct Received {
     pub(crate) log: VerdictLog,
     /// Lines of the history, oldest first.
     pub(crate) lines: VecDeque<String>,
+    /// Number of all lines so far, those included that the history no longer keeps.
+    pub(crate) line_count: usize,
     /// Most serious verdict of each [`STRIP_S`], oldest first; `None` while the device was gone.
     pub(crate) strip: VecDeque<Option<Verdict>>,
     /// The lobes of the table for the working point.
@@ -142,6 +144,7 @@ impl Received {
     /// Adds a line to the history.
     pub(crate) fn line(&mut self, text: String) {
         push(&mut self.lines, text, LINES);
+        self.line_count += 1;
     }
 
     /// Newest spectrum of a band.
