@@ -10,6 +10,7 @@ mod channels;
 mod counted;
 pub mod demo;
 pub mod diagnose;
+pub mod doctor;
 mod error;
 mod experiment;
 pub mod frf;
@@ -91,6 +92,7 @@ enum Verb {
     WorkingPoint(working_point::Args),
     Monitor(monitor::Args),
     Replay(replay::Args),
+    Doctor(doctor::Args),
 }
 
 /// Parses the command line of the process, runs its verb, and returns the exit status.
@@ -210,6 +212,7 @@ fn run(verb: Verb) -> Result<(), Error> {
         Verb::WorkingPoint(args) => working_point::run(args),
         Verb::Monitor(args) => monitor::run(args),
         Verb::Replay(args) => replay::run(args),
+        Verb::Doctor(args) => doctor::run(args),
     }
 }
 
