@@ -7,6 +7,7 @@
 mod assumed;
 pub mod bifurcation;
 mod channels;
+pub mod completions;
 mod counted;
 pub mod demo;
 pub mod diagnose;
@@ -54,7 +55,7 @@ use std::panic;
 use std::process::ExitCode;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
-use clap::{ArgAction, Parser, Subcommand};
+use clap::{ArgAction, CommandFactory, Parser, Subcommand};
 
 pub use error::Error;
 pub use number::{angle, count, finite, non_negative, positive, spindle_speed};
@@ -93,6 +94,7 @@ enum Verb {
     Monitor(monitor::Args),
     Replay(replay::Args),
     Doctor(doctor::Args),
+    Completions(completions::Args),
 }
 
 /// Parses the command line of the process, runs its verb, and returns the exit status.
@@ -213,6 +215,7 @@ fn run(verb: Verb) -> Result<(), Error> {
         Verb::Monitor(args) => monitor::run(args),
         Verb::Replay(args) => replay::run(args),
         Verb::Doctor(args) => doctor::run(args),
+        Verb::Completions(args) => completions::run(args, &mut Cli::command()),
     }
 }
 
@@ -236,8 +239,6 @@ fn log_to_stderr(verbose: u8) {
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
     use super::*;
 
     #[test]
