@@ -65,5 +65,6 @@ pub mod demo;
 pub mod device;
 pub mod doctor;
 pub mod machine;
+mod messages;
 mod monitor;
 pub mod report;

@@ -100,7 +100,9 @@ enum Verb {
 /// Parses the command line of the process, runs its verb, and returns the exit status.
 pub fn main() -> ExitCode {
     panic::set_hook(Box::new(|fault| {
-        eprintln!("quietcut: a fault in quietcut itself, please report it: {fault}");
+        crate::messages::print_fault(&format!(
+            "quietcut: a fault in quietcut itself, please report it: {fault}"
+        ));
     }));
     // `error.exit()` of clap ends the process: with exit status 2 for wrong usage, 0 for `--help` and `--version`.
     let cli = Cli::try_parse().unwrap_or_else(|error| {
@@ -232,7 +234,7 @@ fn log_to_stderr(verbose: u8) {
         .with_ansi(std::io::stderr().is_terminal())
         .with_writer(|| {
             progress::clear();
-            std::io::stderr()
+            crate::messages::Messages
         })
         .init();
 }

@@ -75,6 +75,8 @@ pub fn run(args: Args) -> Result<(), Error> {
     let stop = Arc::new(AtomicBool::new(false));
     let on_interrupt = stop.clone();
     ctrlc::set_handler(move || on_interrupt.store(true, Ordering::Relaxed)).map_err(Error::other)?;
+    // The signal with which a system or a service manager ends a program: the terminal is left as it was.
+    signal_hook::flag::register(signal_hook::consts::SIGTERM, stop.clone()).map_err(Error::other)?;
 
     // With a `--seconds` beyond the range of the clock, `monitor` runs until Ctrl-C.
     let end = args

@@ -14,6 +14,7 @@ use super::live::{Live, LiveError, Outcome};
 use super::received::Received;
 use super::view::{self, palette::Palette};
 use crate::device::{Client, DeviceError};
+use crate::messages::{self, Hold};
 
 /// Shortest time between two pictures: a choice; ten a second are smooth, and little over a slow line.
 const BETWEEN_PICTURES: Duration = Duration::from_millis(100);
@@ -30,6 +31,9 @@ pub(crate) enum ScreenError {
     /// The device cannot be reached, or its table cannot be used.
     #[error(transparent)]
     Live(#[from] LiveError),
+    /// A thread has panicked; its message is printed.
+    #[error("the picture has ended after a fault in quietcut itself")]
+    Fault,
 }
 
 /// Shows the device at `port` until the user quits or `stop` is true. `connect` makes a connection; `table` holds the
@@ -45,9 +49,12 @@ pub(crate) fn show(
     stop: &Arc<AtomicBool>,
 ) -> Result<Outcome, ScreenError> {
     let live = Live::start(port, connect, table, stop).map_err(LiveError::from)?;
+    // Dropped after the terminal is as before, and then prints what was held back.
+    let messages = Hold::begin();
     let mut terminal = ratatui::try_init()?;
     let mut screen = Screen {
         live,
+        messages,
         frozen: None,
         choices: Choices::default(),
         palette: Palette::of_environment(),
@@ -61,6 +68,7 @@ pub(crate) fn show(
 /// State of the view.
 struct Screen {
     live: Live,
+    messages: Hold,
     /// Copy that is shown while the picture stands still.
     frozen: Option<Box<Received>>,
     choices: Choices,
@@ -76,6 +84,12 @@ impl Screen {
                 return Ok(());
             }
             while self.live.take(Duration::ZERO)? {}
+            for line in self.messages.take_lines() {
+                self.live.received.line(line);
+            }
+            if messages::has_fault() {
+                return Err(ScreenError::Fault);
+            }
             if drawn.elapsed() >= BETWEEN_PICTURES {
                 self.draw(terminal)?;
                 drawn = Instant::now();
