@@ -3,7 +3,8 @@
 //! It re-exports library crates of the workspace: recording, frf, simulate, stability, identify, diagnose, and parts of
 //! model. Its own public modules: [`cli`] parses arguments and prints answers, [`report`] draws pictures and pages,
 //! [`device`] speaks with a monitor over a serial port, [`demo`] shows the monitor without a machine, [`machine`] reads
-//! the folder of a machine, writes the text of its case and proposes the next step.
+//! the folder of a machine, writes the text of its case and proposes the next step, [`doctor`] examines ports, device and
+//! lobe table.
 //!
 //! The stability limit of a case at one spindle speed:
 //!
@@ -62,6 +63,8 @@ pub mod cli;
 mod criteria;
 pub mod demo;
 pub mod device;
+pub mod doctor;
 pub mod machine;
+mod messages;
 mod monitor;
 pub mod report;

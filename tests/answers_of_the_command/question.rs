@@ -46,6 +46,14 @@ const EXAMPLES_LEFT_OUT: &[(&str, &str)] = &[
         "upload",
         "its answer counts messages in real time; `table` compares the bytes that it sends",
     ),
+    (
+        "doctor",
+        "its counters depend on real time, and its ports on the computer",
+    ),
+    (
+        "completions",
+        "prints a script, which `tests/completions.rs` runs in its shell",
+    ),
 ];
 
 /// Former names of verbs that the command still takes: name in the help, former name.

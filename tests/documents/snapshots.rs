@@ -95,6 +95,7 @@ fn shapes_of_json_answers_are_as_reviewed() {
         "setup mill --teeth 2 --diameter-mm 12.7 --ktc-mpa 119 --krc-mpa 20.2 --kac-mpa 39.3 --down-milling-mm 6.35 --feed-per-tooth-mm 0.15 --rpm 600:2400",
         "next mill",
         "working-point simulated --depth-mm 2 --start 90 --exit 180 --feed 0.15",
+        "doctor simulated",
     ] {
         let arguments: Vec<_> = line.split(' ').chain(["--json"]).collect();
         let answer = quietcut(folder.path(), &arguments).json();

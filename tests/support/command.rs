@@ -80,6 +80,18 @@ impl Running {
         drop(self.child.stdout.take());
     }
 
+    /// Reads the next line of standard output, without its end; empty once the command has ended.
+    pub fn next_line(&mut self) -> String {
+        let stdout = self.child.stdout.as_mut().expect("standard output is read");
+        let mut line = Vec::new();
+        let mut byte = [0];
+        // One byte at a time, so that nothing after the line is taken.
+        while stdout.read(&mut byte).is_ok_and(|count| count == 1) && byte != *b"\n" {
+            line.extend(byte);
+        }
+        String::from_utf8(line).expect("the command writes UTF-8")
+    }
+
     /// Sends the signal of Ctrl-C.
     pub fn interrupt(&self) {
         let id = self.child.id().to_string();
@@ -130,6 +142,16 @@ impl Running {
             status: status.code(),
             stdout: stdout.join().expect("standard output was read"),
             stderr: stderr.join().expect("standard error was read"),
+        }
+    }
+}
+
+impl Drop for Running {
+    /// Ends a command that a failed test has left behind.
+    fn drop(&mut self) {
+        if self.child.try_wait().is_ok_and(|status| status.is_none()) && self.child.kill().is_ok() {
+            // The outcome of a killed command is of no use.
+            let _ = self.child.wait();
         }
     }
 }

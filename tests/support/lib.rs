@@ -5,6 +5,7 @@
 #![allow(clippy::expect_used, clippy::panic)]
 
 pub mod acceptance;
+pub mod browser;
 pub mod campaign;
 pub mod chain_bits;
 pub mod command;
@@ -13,6 +14,7 @@ pub mod device_log;
 pub mod documents;
 pub mod emulator;
 pub mod firmware_image;
+pub mod monitor_page;
 pub mod outputs;
 pub mod pty;
 pub mod raw_host;

@@ -8,6 +8,7 @@ use crate::device::DeviceError;
 use crate::file::FileError;
 use crate::lobe_table::BuildError;
 use crate::machine::FolderError;
+use crate::monitor::web::WebError;
 use crate::plan::PlanError;
 use crate::recording::cut_table::CutTableError;
 use crate::stability::StabilityError;
@@ -150,6 +151,15 @@ impl From<DeviceError> for Error {
             // These errors concern the port, the cable, the device, the lobe table or the state file of the simulated
             // device, which the user can correct: they are input errors.
             _ => Self::input(error),
+        }
+    }
+}
+
+impl From<WebError> for Error {
+    fn from(error: WebError) -> Self {
+        match error {
+            WebError::Bind { .. } => Self::input(error),
+            WebError::Server(_) | WebError::Random { .. } => Self::other(error),
         }
     }
 }

@@ -7,9 +7,11 @@
 mod assumed;
 pub mod bifurcation;
 mod channels;
+pub mod completions;
 mod counted;
 pub mod demo;
 pub mod diagnose;
+pub mod doctor;
 mod error;
 mod experiment;
 pub mod frf;
@@ -53,7 +55,7 @@ use std::panic;
 use std::process::ExitCode;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
-use clap::{ArgAction, Parser, Subcommand};
+use clap::{ArgAction, CommandFactory, Parser, Subcommand};
 
 pub use error::Error;
 pub use number::{angle, count, finite, non_negative, positive, spindle_speed};
@@ -91,12 +93,16 @@ enum Verb {
     WorkingPoint(working_point::Args),
     Monitor(monitor::Args),
     Replay(replay::Args),
+    Doctor(doctor::Args),
+    Completions(completions::Args),
 }
 
 /// Parses the command line of the process, runs its verb, and returns the exit status.
 pub fn main() -> ExitCode {
     panic::set_hook(Box::new(|fault| {
-        eprintln!("quietcut: a fault in quietcut itself, please report it: {fault}");
+        crate::messages::print_fault(&format!(
+            "quietcut: a fault in quietcut itself, please report it: {fault}"
+        ));
     }));
     // `error.exit()` of clap ends the process: with exit status 2 for wrong usage, 0 for `--help` and `--version`.
     let cli = Cli::try_parse().unwrap_or_else(|error| {
@@ -210,6 +216,8 @@ fn run(verb: Verb) -> Result<(), Error> {
         Verb::WorkingPoint(args) => working_point::run(args),
         Verb::Monitor(args) => monitor::run(args),
         Verb::Replay(args) => replay::run(args),
+        Verb::Doctor(args) => doctor::run(args),
+        Verb::Completions(args) => completions::run(args, &mut Cli::command()),
     }
 }
 
@@ -226,15 +234,13 @@ fn log_to_stderr(verbose: u8) {
         .with_ansi(std::io::stderr().is_terminal())
         .with_writer(|| {
             progress::clear();
-            std::io::stderr()
+            crate::messages::Messages
         })
         .init();
 }
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
     use super::*;
 
     #[test]

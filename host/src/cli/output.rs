@@ -134,6 +134,22 @@ impl StreamedOutput {
         }
     }
 
+    /// Prints one event that has no text of its own: the JSON of `object` with `--json-lines`, else nothing.
+    pub(super) fn object(self, object: &impl Serialize) -> Result<(), Error> {
+        if self.json_lines {
+            print(&serde_json::to_string(object).map_err(Error::other)?)
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Prints a line of text on standard error with `--json`, whose only object comes at the end; nothing otherwise.
+    pub(super) fn apart(self, text: impl Display) {
+        if self.output.is_json() {
+            eprintln!("{text}");
+        }
+    }
+
     /// Prints a line of text that has no JSON; prints nothing with `--json` or `--json-lines`.
     pub fn line(self, text: impl Display) -> Result<(), Error> {
         if self.json_lines {

@@ -1,10 +1,12 @@
-//! The thread that listens to the device, and connects again after the cable was pulled.
+//! The thread that receives from the device, and connects again after the cable was pulled.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::SyncSender;
 use std::time::{Duration, Instant};
 
 use quietcut_core::protocol::{Info, Reports, Subscription};
+
+use quietcut_core::working_point::WorkingPoint;
 
 use super::received::Identity;
 use crate::device::{Client, DeviceError, Event};
@@ -19,10 +21,16 @@ const BETWEEN_TRIES: Duration = Duration::from_millis(500);
 /// restarted behind an adapter has forgotten that it shall send, and its port does not vanish.
 const SILENCE: Duration = Duration::from_secs(3);
 
+/// Time between two questions for the working point: a choice. Another program or a restart may change it, and chart and
+/// margin follow.
+const BETWEEN_STATES: Duration = Duration::from_secs(2);
+
 /// News of the device.
 pub(crate) enum News {
     /// The connection is made, for the first time or again.
     Up(Identity),
+    /// The working point of the device has changed.
+    Point(Option<WorkingPoint>),
     /// The device sent an event.
     Event(Box<Event>),
     /// The connection is lost and is tried again.
@@ -40,7 +48,7 @@ const ALL: Subscription = Subscription {
     strobes: true,
 };
 
-/// Listens to the device until `stop` is true or nobody receives the news; `connect` makes a new connection.
+/// Receives from the device until `stop` is true or nobody receives the news; `connect` makes a new connection.
 pub(crate) fn listen(
     mut connect: impl FnMut() -> Result<(Client, Info), DeviceError>,
     news: &SyncSender<News>,
@@ -88,7 +96,7 @@ fn may_return(error: &DeviceError) -> bool {
     )
 }
 
-/// Listens on one connection until `stop`; returns the number of messages lost on it.
+/// Receives on one connection until `stop`; returns the number of messages lost on it.
 fn session(
     mut client: Client,
     info: &Info,
@@ -105,9 +113,18 @@ fn session(
     };
     client.subscribe(ALL)?;
     *was_up = true;
+    let mut point = identity.working_point;
     let mut is_received = news.send(News::Up(identity)).is_ok();
-    let mut last_event = Instant::now();
+    let (mut last_event, mut last_state) = (Instant::now(), Instant::now());
     while is_received && !stop.load(Ordering::Relaxed) {
+        if last_state.elapsed() > BETWEEN_STATES {
+            last_state = Instant::now();
+            let present = client.status()?.working_point;
+            if present != point {
+                point = present;
+                is_received = news.send(News::Point(point)).is_ok();
+            }
+        }
         if let Some(event) = client.next_event(EVENT_TIMEOUT)? {
             last_event = Instant::now();
             is_received = news.send(News::Event(Box::new(event))).is_ok();

@@ -1,10 +1,16 @@
 //! The lobe table over speed and depth for one cut, and the margin of the cut in it.
 
+use std::sync::Arc;
+
 use quietcut_core::lobes::{Column, IntervalKind, LobeTable, TableError, TabulatedStability};
 use quietcut_core::units::{Millimeters, Rpm};
 use quietcut_core::working_point::WorkingPoint;
 
 use crate::report::words;
+
+/// Number of speeds of the lobe chart: a choice, one for each second pixel of a page 800 pixels wide, and more than the
+/// columns of a terminal.
+pub(crate) const COLUMNS: usize = 400;
 
 /// A lobe table with the feed, immersion and posture for which it is drawn.
 #[derive(Clone, Debug)]
@@ -17,6 +23,7 @@ pub(crate) struct LobeMap {
     pub(crate) rpm: [f64; 2],
     /// Largest depth of the table, mm.
     pub(crate) depth_mm: f64,
+    columns: Arc<[Option<Column>]>,
 }
 
 impl LobeMap {
@@ -44,18 +51,40 @@ impl LobeMap {
             feed_per_tooth: Millimeters(0.0),
             posture: 0,
         });
-        Ok(Self {
+        let mut map = Self {
             bytes,
             point,
             is_assumed,
             rpm,
             depth_mm,
-        })
+            columns: Arc::default(),
+        };
+        map.columns = (0..COLUMNS).map(|index| map.column(map.speed(index))).collect();
+        Ok(map)
     }
 
     /// The same table at another working point.
     pub(crate) fn at(self, point: Option<WorkingPoint>) -> Result<Self, TableError> {
+        let is_same = match point {
+            Some(point) => !self.is_assumed && point == self.point,
+            None => self.is_assumed,
+        };
+        if is_same {
+            return Ok(self);
+        }
         Self::new(self.bytes, point)
+    }
+
+    /// Speed in the middle of a column of the chart, rev/min.
+    fn speed(&self, index: usize) -> f64 {
+        let [from, to] = self.rpm;
+        from + (index as f64 + 0.5) / COLUMNS as f64 * (to - from)
+    }
+
+    /// Columns of the chart, at [`COLUMNS`] speeds that share the range of the table: unstable depths, `None` where the
+    /// table has none for this cut.
+    pub(crate) fn columns(&self) -> &[Option<Column>] {
+        &self.columns
     }
 
     /// Axial depth of the working point, mm; `None` if none is set.
@@ -64,7 +93,7 @@ impl LobeMap {
     }
 
     /// Unstable depths at a speed; `None` where the table has none for this cut.
-    pub(crate) fn column(&self, rpm: f64) -> Option<Column> {
+    fn column(&self, rpm: f64) -> Option<Column> {
         let table = LobeTable::reopen(&self.bytes).ok()?;
         table.column(Rpm(rpm as f32), &self.point).ok()
     }

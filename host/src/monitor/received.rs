@@ -25,6 +25,9 @@ pub(crate) const STRIP_S: f64 = 0.5;
 /// Number of cells of the strip of verdicts that are kept: a choice, more than any terminal shows.
 const STRIP: usize = 600;
 
+/// Number of tooth-passing harmonics that the fitted frequency scale shows: a choice.
+const HARMONICS: f64 = 8.0;
+
 /// State of the connection to the device.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) enum Connection {
@@ -64,6 +67,8 @@ pub(crate) struct Received {
     pub(crate) log: VerdictLog,
     /// Lines of the history, oldest first.
     pub(crate) lines: VecDeque<String>,
+    /// Number of all lines so far, those included that the history no longer keeps.
+    pub(crate) line_count: usize,
     /// Most serious verdict of each [`STRIP_S`], oldest first; `None` while the device was gone.
     pub(crate) strip: VecDeque<Option<Verdict>>,
     /// The lobes of the table for the working point.
@@ -136,8 +141,10 @@ impl Received {
         }
     }
 
-    fn line(&mut self, text: String) {
+    /// Adds a line to the history.
+    pub(crate) fn line(&mut self, text: String) {
         push(&mut self.lines, text, LINES);
+        self.line_count += 1;
     }
 
     /// Newest spectrum of a band.
@@ -163,6 +170,20 @@ impl Received {
     /// Chatter frequency, Hz.
     pub(crate) fn chatter_hz(&self) -> Option<f64> {
         Some(f64::from(self.report?.judgement.chatter?.0))
+    }
+
+    /// Tooth-passing frequency, Hz; `None` while the speed is unknown.
+    pub(crate) fn tooth_hz(&self) -> Option<f64> {
+        let teeth = f64::from(self.identity.as_ref()?.teeth);
+        Some(self.rpm()? / 60.0 * teeth)
+    }
+
+    /// End of a frequency scale that shows tooth passing and chatter, Hz, within the spectrum of the band.
+    pub(crate) fn fitted_end_hz(&self, band: Band) -> f64 {
+        let whole = self.spectrum(band).end_hz();
+        let tooth = self.tooth_hz().unwrap_or(whole);
+        let chatter = self.chatter_hz().unwrap_or_default();
+        (HARMONICS * tooth).max(2.0 * chatter).min(whole)
     }
 }
 

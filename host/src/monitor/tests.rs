@@ -205,7 +205,7 @@ fn a_lost_device_is_shown_and_its_last_report_is_not_shown_as_live() {
 }
 
 /// A table from 600 to 800 rev/min and 6 mm: a Hopf limit at 1.5 mm, and again stable from 3 to 4 mm.
-fn lobes(depth_mm: Option<f32>) -> LobeMap {
+pub(super) fn lobes(depth_mm: Option<f32>) -> LobeMap {
     let hopf = |from, to| Interval {
         from: Millimeters(from),
         to: Millimeters(to),

@@ -1,6 +1,5 @@
 //! The upper part: port, verdict and speed in large letters, advice, margin, strip of verdicts.
 
-use quietcut_core::detector::Verdict;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
@@ -8,9 +7,8 @@ use ratatui::style::Style;
 use super::frame::{put, wrapped};
 use super::letters::{self, Size};
 use super::palette::Palette;
-use crate::monitor::lobes::Margin;
-use crate::monitor::received::{Connection, Received, STRIP_S};
-use crate::report::words;
+use crate::monitor::received::{Received, STRIP_S};
+use crate::monitor::sentences::letter;
 
 /// Rows of a terminal from which margin and strip of verdicts are shown: a choice.
 const ROWS_OF_ALL: u16 = 20;
@@ -40,8 +38,8 @@ pub(super) fn draw(
         put(area, used, text, style, buffer);
         used += 1;
     };
-    line(&sentence(received), palette.verdict(verdict(received)));
-    line(&advice(received), Style::new());
+    line(&received.sentence(), palette.verdict(received.verdict()));
+    line(&format!("advice: {}", received.advice_text()), Style::new());
     if area.height >= ROWS_OF_ALL {
         // The reason may take two rows, which stay empty otherwise so that the charts do not jump.
         let rows = if area.height >= ROWS_OF_REASON { 2 } else { 1 };
@@ -49,7 +47,7 @@ pub(super) fn draw(
         for row in 0..rows {
             line(reason.get(row).map_or("", String::as_str), palette.faint());
         }
-        line(&margin(received), Style::new());
+        line(&format!("margin: {}", received.margin_text()), Style::new());
         draw_strip(received, palette, below(used), buffer);
         used += 1;
     }
@@ -64,16 +62,17 @@ pub(super) fn draw_small(
     area: Rect,
     buffer: &mut Buffer,
 ) {
-    let style = palette.verdict(verdict(received));
+    let style = palette.verdict(received.verdict());
     put(
         area,
         0,
-        &format!("{} {}", word(received), speed(received)),
+        &format!("{} {}", received.word(), received.speed_text()),
         style,
         buffer,
     );
-    put(area, 1, &sentence(received), Style::new(), buffer);
-    put(area, 2, &advice(received), Style::new(), buffer);
+    put(area, 1, &received.sentence(), Style::new(), buffer);
+    let advice = format!("advice: {}", received.advice_text());
+    put(area, 2, &advice, Style::new(), buffer);
     let hint = format!("min {} x {}; q quits", least.0, least.1);
     put(
         area,
@@ -85,59 +84,32 @@ pub(super) fn draw_small(
 }
 
 fn title(received: &Received, frozen: bool) -> String {
-    let state = match &received.connection {
-        Connection::Connecting => "connecting".into(),
-        Connection::Up if received.report.is_none() => "connected, no report yet".into(),
-        Connection::Up => "live".into(),
-        Connection::Gone(_) => format!("CABLE PULLED, WAITING FOR {}", received.port),
-    };
-    let device = received.identity.as_ref().map(|identity| {
-        let table = identity.table.as_deref().unwrap_or("no table");
-        format!("  {}, {} teeth, {table}", identity.name, identity.teeth)
-    });
     let frozen = if frozen { "FROZEN (Space goes on)  " } else { "" };
+    let device = received.device_text();
+    let gap = if device.is_empty() { "" } else { "  " };
     format!(
-        "{frozen}quietcut {}: {state}{}",
+        "{frozen}quietcut {}: {}{gap}{device}",
         received.port,
-        device.unwrap_or_default()
+        received.connection_text()
     )
 }
 
-fn verdict(received: &Received) -> Option<Verdict> {
-    Some(received.report?.judgement.verdict)
-}
-
-/// Verdict in one word for the large letters.
-fn word(received: &Received) -> &'static str {
-    match (&received.connection, verdict(received)) {
-        (Connection::Gone(_), _) => "GONE",
-        (_, None) => "?",
-        (_, Some(verdict)) => match verdict {
-            Verdict::AirCut => "IN AIR",
-            Verdict::Stable => "QUIET",
-            Verdict::Hopf | Verdict::PeriodDoubling => "CHATTER",
-            Verdict::Forced => "FORCED",
-            Verdict::Runout => "RUNOUT",
-            Verdict::Indeterminate => "UNSURE",
-        },
+fn reason(received: &Received) -> String {
+    match received.reason_text() {
+        why if why.is_empty() => why,
+        why => format!("reason: {why}"),
     }
-}
-
-fn speed(received: &Received) -> String {
-    received
-        .rpm()
-        .map_or_else(|| "?".into(), |rpm| format!("{rpm:.0}"))
 }
 
 /// Draws verdict and speed in large letters; returns the number of rows.
 fn draw_large(received: &Received, palette: Palette, area: Rect, rows: u16, buffer: &mut Buffer) -> u16 {
     const UNIT: &str = "rev/min";
-    let (word, speed) = (word(received), speed(received));
+    let (word, speed) = (received.word(), received.speed_text());
     // The size is that of the longest verdict, so that the picture does not jump when the verdict changes.
     let widest = format!("CHATTER {}", if speed.len() > 5 { "000000" } else { "00000" });
     let room = area.width.saturating_sub(UNIT.len() as u16 + GAP + 1);
     let size = Size::fitting(&widest, room, rows);
-    let style = palette.verdict(verdict(received));
+    let style = palette.verdict(received.verdict());
     letters::draw(word, size, style, area, buffer);
     let from = size.columns("CHATTER") + GAP;
     let right = Rect {
@@ -160,64 +132,6 @@ fn draw_large(received: &Received, palette: Palette, area: Rect, rows: u16, buff
     };
     put(unit, size.rows() - 1, UNIT, palette.faint(), buffer);
     size.rows()
-}
-
-fn sentence(received: &Received) -> String {
-    match (&received.connection, &received.report) {
-        (Connection::Gone(reason), _) => reason.clone(),
-        (_, Some(report)) => words::verdict(&report.judgement),
-        (Connection::Connecting, None) => format!("connecting to {}", received.port),
-        (Connection::Up, None) => "the device is connected and has sent no report yet".into(),
-    }
-}
-
-fn advice(received: &Received) -> String {
-    match received.report.and_then(|report| report.advice) {
-        Some(advice) => format!("advice: {}", words::action(&advice)),
-        None => "advice: none".into(),
-    }
-}
-
-fn reason(received: &Received) -> String {
-    let why = received.report.and_then(|report| {
-        let advice = report.advice?;
-        Some(words::why(&advice, &report.judgement, report.speed))
-    });
-    why.map_or_else(String::new, |why| format!("reason: {why}"))
-}
-
-fn margin(received: &Received) -> String {
-    let counts = match received.report {
-        Some(report) if report.clipped > 0 || report.lost > 0 => {
-            format!("; {} samples clipped, {} lost", report.clipped, report.lost)
-        }
-        _ => String::new(),
-    };
-    let margin = match (&received.lobes, received.rpm()) {
-        (None, _) => "not known without --table FILE.qct".into(),
-        (_, None) => "not known without a speed".into(),
-        (Some(lobes), Some(rpm)) => match lobes.margin(rpm) {
-            margin @ (Margin::Below { .. } | Margin::Unlimited { .. }) if received.chatter_hz().is_some() => {
-                format!("{margin}; but it chatters: table or depth is wrong")
-            }
-            margin => margin.to_string(),
-        },
-    };
-    format!("margin: {margin}{counts}")
-}
-
-/// Letter of a verdict in the strip.
-fn letter(verdict: Option<Verdict>) -> char {
-    match verdict {
-        Some(Verdict::AirCut) => '.',
-        Some(Verdict::Stable) => 'q',
-        Some(Verdict::Hopf) => 'H',
-        Some(Verdict::PeriodDoubling) => 'D',
-        Some(Verdict::Forced) => 'F',
-        Some(Verdict::Runout) => 'R',
-        Some(Verdict::Indeterminate) => '?',
-        None => '|',
-    }
 }
 
 /// The verdicts of the last time as letters, the newest at the right.

@@ -7,7 +7,7 @@ use ratatui::layout::Rect;
 
 use super::frame::{framed, put};
 use super::palette::Palette;
-use crate::monitor::lobes::{LobeMap, letter};
+use crate::monitor::lobes::{COLUMNS, LobeMap, letter};
 use crate::monitor::received::Received;
 
 /// Draws the lobes of the table around the working point.
@@ -54,13 +54,13 @@ pub(super) fn draw(received: &Received, palette: Palette, area: Rect, buffer: &m
 
 /// Letters of the unstable regions; `x` where the table holds nothing for this cut.
 fn draw_regions(lobes: &LobeMap, palette: Palette, chart: Rect, buffer: &mut Buffer) {
-    let [from, to] = lobes.rpm;
     for x in 0..chart.width {
         let share = (f64::from(x) + 0.5) / f64::from(chart.width);
-        let column = lobes.column(from + share * (to - from));
+        let index = (share * COLUMNS as f64) as usize;
+        let column = lobes.columns().get(index).and_then(Option::as_ref);
         for y in 0..chart.height {
             let depth = (1.0 - (f64::from(y) + 0.5) / f64::from(chart.height)) * lobes.depth_mm;
-            let symbol = match column.as_ref().map(|column| column.at(Millimeters(depth as f32))) {
+            let symbol = match column.map(|column| column.at(Millimeters(depth as f32))) {
                 Some(TabulatedStability::Stable { .. }) => ' ',
                 Some(TabulatedStability::Unstable { kind, .. }) => letter(kind),
                 Some(TabulatedStability::NotKnown(_)) => '?',

@@ -14,9 +14,6 @@ const RANGE_DB: f64 = 50.0;
 /// Bars of one to eight eighths of a cell.
 const EIGHTHS: [&str; 9] = [" ", "▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"];
 
-/// Number of tooth-passing harmonics that the fitted frequency scale shows: a choice.
-const HARMONICS: f64 = 8.0;
-
 /// Draws the spectrum of the chosen band.
 pub(super) fn draw(
     received: &Received,
@@ -57,22 +54,12 @@ fn peak_text(power: &[f32]) -> String {
     format!("{:.3} m/s²", top.sqrt())
 }
 
-/// End of the frequency scale, Hz: as chosen by zoom, else such that tooth passing and chatter are shown.
+/// End of the frequency scale, Hz: as chosen by zoom, else as fitted to speed and chatter.
 fn end_hz(received: &Received, choices: &Choices) -> f64 {
-    let spectrum = received.spectrum(choices.band);
-    let whole = spectrum.end_hz();
-    if let Some(zoom) = choices.zoom {
-        return whole / f64::from(1_u32 << zoom);
+    match choices.zoom {
+        Some(zoom) => received.spectrum(choices.band).end_hz() / f64::from(1_u32 << zoom),
+        None => received.fitted_end_hz(choices.band),
     }
-    let tooth = tooth_hz(received).unwrap_or(whole);
-    let chatter = received.chatter_hz().unwrap_or_default();
-    (HARMONICS * tooth).max(2.0 * chatter).min(whole)
-}
-
-/// Tooth-passing frequency, Hz; `None` while the speed is unknown.
-fn tooth_hz(received: &Received) -> Option<f64> {
-    let teeth = f64::from(received.identity.as_ref()?.teeth);
-    Some(received.rpm()? / 60.0 * teeth)
 }
 
 fn draw_bars(power: &[f32], palette: Palette, area: Rect, buffer: &mut Buffer) {
@@ -109,7 +96,7 @@ fn draw_marks(received: &Received, end_hz: f64, palette: Palette, inside: Rect, 
         let is_of = |step: Option<f64>| step.is_some_and(|hz| hz > 3.0 * width_hz && holds(column, hz));
         let (mark, style) = if is_chatter {
             ("▲", palette.mark())
-        } else if is_of(tooth_hz(received)) {
+        } else if is_of(received.tooth_hz()) {
             ("T", palette.title())
         } else if is_of(spindle) {
             ("·", palette.faint())
