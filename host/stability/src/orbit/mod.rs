@@ -12,6 +12,7 @@ mod branch;
 mod branch_record;
 mod branches;
 mod choice;
+mod coefficients;
 mod collocated;
 mod collocation_matrix;
 mod criticality;
@@ -26,6 +27,7 @@ mod forced_method;
 mod pairing;
 mod parameter;
 mod periodic_orbit;
+mod ports;
 mod restoring;
 mod resumed_branch;
 mod revolution_period;
@@ -36,6 +38,8 @@ mod variation;
 mod varied_period;
 
 #[cfg(test)]
+mod coefficients_tests;
+#[cfg(test)]
 mod follower_tests;
 #[cfg(test)]
 mod revolution_period_tests;
@@ -44,6 +48,7 @@ pub use branch::{Branch, BranchPoint, BrokenBranch, Event, Extent};
 pub use branch_record::{BranchJournal, BranchRecord, Unrecorded};
 pub use branches::{follow, follow_depth, follow_recorded};
 pub use choice::collocation_of;
+pub use coefficients::{Coefficients, Smoothing};
 pub use criticality::{Criticality, criticality};
 pub use equivalent::EquivalentProblem;
 pub use forced::ForcedProblem;

@@ -20,7 +20,7 @@ mod start;
 #[cfg(test)]
 mod brute_force_tests;
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 
 pub use error::CurveError;
 pub use follow::follow_curve;

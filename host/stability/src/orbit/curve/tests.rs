@@ -12,7 +12,7 @@ use super::points::{Curve, CurveEnd, CurveJournal, CurveRecord, CurveSeed, NoJou
 use crate::spectrum::stability_loss::StabilityLoss;
 
 /// Spindle speed, rev/min, of a tooth period τ in the dimensionless units of chapter 6.
-pub(super) fn rpm(tau: f64) -> f64 {
+pub(in crate::orbit) fn rpm(tau: f64) -> f64 {
     30.0 * NATURAL_RAD_PER_S / tau
 }
 
@@ -20,7 +20,7 @@ pub(super) fn rpm(tau: f64) -> f64 {
 const NATURAL_RAD_PER_S: f64 = 109.641_6;
 
 /// Factor from depth in mm to the dimensionless depth w of chapter 6: K_tc/k_yy = 76 MPa / 2.26 MN/m.
-pub(super) const W_PER_MM: f64 = 76.0 / 2260.0;
+pub(in crate::orbit) const W_PER_MM: f64 = 76.0 / 2260.0;
 
 fn full() -> ForcedProblem {
     ForcedProblem::new(&quietcut_testkit::case("kuka-kr90-full-cubic")).unwrap()
