@@ -34,6 +34,7 @@ mod revolution_period;
 mod subharmonic;
 mod tooth_period;
 mod tooth_period_map;
+mod torus;
 mod variation;
 mod varied_period;
 
@@ -55,3 +56,4 @@ pub use forced::ForcedProblem;
 pub use parameter::{Parameter, Place, Setting};
 pub use periodic_orbit::{Orbit, OrbitError};
 pub use subharmonic::{BrokenDoubledBranch, DoubledBranch, DoubledPoint, follow_doubled};
+pub use torus::{TorusBranch, TorusEnd, TorusPoint, follow_torus};
