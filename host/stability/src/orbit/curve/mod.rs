@@ -9,6 +9,7 @@
 //! tool with an even number of teeth it would be +1.
 
 mod criteria;
+mod doubles;
 mod error;
 mod extended;
 mod follow;
@@ -25,5 +26,6 @@ pub(super) mod tests;
 pub use error::CurveError;
 pub use follow::follow_curve;
 pub use points::{
-    Curve, CurveEnd, CurveJournal, CurvePoint, CurveRecord, CurveSeed, NoJournal, Plane, Resonance,
+    Curve, CurveEnd, CurveJournal, CurvePoint, CurveRecord, CurveSeed, DoubleLoss, NoJournal, Plane,
+    Resonance,
 };

@@ -129,6 +129,37 @@ fn the_second_torus_ends_near_8_56_where_its_multipliers_meet_at_minus_one() {
 }
 
 #[test]
+fn torus_curves_have_the_double_hopf_points_of_another_program() {
+    // Without feed the orbit is rest. References: characteristic matrix and collocation of the linear problem.
+    for (name, tau, w) in [
+        ("kuka-kr90-full", 6.0428, 0.39987),
+        ("kuka-kr90-half", 6.0548, 0.35043),
+    ] {
+        let problem = ForcedProblem::new(&quietcut_testkit::case(name)).unwrap();
+        let curve = curve_from(&problem, 5.9, StabilityLoss::Hopf, depth_and_speed(5.8, 6.2));
+        for double in &curve.doubles {
+            let at = &double.point.setting;
+            println!(
+                "{name}: {:?} at τ {:.5}, w {:.6}",
+                double.other,
+                rpm(1.0) / at.rpm,
+                at.depth_mm * W_PER_MM
+            );
+        }
+        let found = curve
+            .doubles
+            .iter()
+            .find(|double| double.other == StabilityLoss::Hopf && double.point.outside == 0)
+            .unwrap();
+        let at = &found.point.setting;
+        // The digits of the references.
+        assert!((rpm(1.0) / at.rpm - tau).abs() < 1e-4, "{name}: {found:?}");
+        assert!((at.depth_mm * W_PER_MM - w).abs() < 2e-5, "{name}: {found:?}");
+        assert!((found.other_rotation_per_tooth - found.point.rotation_per_tooth).abs() > 0.01);
+    }
+}
+
+#[test]
 fn curves_are_the_losses_of_branches_over_the_depth_at_every_speed() {
     let problem = full();
     for (kind, from, taus) in [

@@ -156,7 +156,8 @@ fn point_of_figure_6_13(tau: f64, w: f64, periods: [usize; 2]) {
     let first = &branch.points[0];
     let at_loss = event.multiplier.arg() / TAU;
     assert!(
-        (first.depth_mm / event.value - 1.0).abs() < 2e-3,
+        // The first torus has a finite size, which grows in proportion to the excess of the depth where contact is lost.
+        (first.depth_mm / event.value - 1.0).abs() < 1e-2,
         "{first:?} {}",
         event.value
     );
