@@ -21,6 +21,8 @@ mod start;
 #[cfg(test)]
 mod brute_force_tests;
 #[cfg(test)]
+mod cost_tests;
+#[cfg(test)]
 pub(super) mod tests;
 
 pub use error::CurveError;
