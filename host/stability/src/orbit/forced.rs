@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
+use super::coefficients::Coefficients;
 use crate::criteria::VELOCITY_JUMP;
 use crate::error::StabilityError;
 use crate::problem::linear::{CubicTerms, Problem};
@@ -43,6 +44,8 @@ pub struct ForcedProblem {
     /// Smooth restoring forces of the case's extensions, with the structure in the machine's axes; `None` without such
     /// forces.
     pub(super) smooth: Option<Smooth>,
+    /// Directional coefficients.
+    pub(super) coefficients: Coefficients,
     /// Chip law of the cutting force; `None` if the cutting force is proportional to the chip thickness.
     pub(super) chip: Option<ChipLaw>,
     /// Process damping; `None` if absent.
@@ -223,6 +226,7 @@ impl ForcedProblem {
             chip: about.law.chip,
             flank,
             push: None,
+            coefficients: Coefficients::Exact,
             inertial,
             linear,
             cubic,
@@ -312,15 +316,18 @@ impl ForcedProblem {
         self.linear.structure.order()
     }
 
-    /// Force per axial depth, N/m, due to feed and edges, of all teeth that cut at a phase of the tooth period (rad).
+    /// Force per axial depth, N/m, due to feed and edges, of all ports of the cut at a phase of the tooth period (rad).
     /// The vibration does not enter.
     pub(super) fn force_per_depth(&self, teeth: usize, phase: f64) -> Vector3<f64> {
         let process = &self.linear.process;
+        if let Some(averaged) = self.averaged_force() {
+            return averaged;
+        }
         (0..teeth)
             .map(|tooth| {
                 let angle = process.engagement.angle(tooth, phase);
                 match self.chip {
-                    None => process.force.forced(angle, process.feed_per_tooth_m),
+                    None => process.force.forced(angle, process.feed_per_tooth_m) * self.share(angle),
                     Some(chip) => {
                         let thickness_m = process.force.normal.at(angle).x * process.feed_per_tooth_m;
                         process.force.cutting.at(angle) * chip.effective_m(thickness_m)

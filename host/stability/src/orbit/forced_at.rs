@@ -33,12 +33,10 @@ impl ForcedProblem {
 
     /// Derivative of [`force_per_depth`](Self::force_per_depth) with respect to the feed per tooth, N/m².
     pub(super) fn force_per_depth_and_feed(&self, teeth: usize, phase: f64) -> Vector3<f64> {
-        let process = &self.linear.process;
         (0..teeth)
             .map(|tooth| {
-                let angle = process.engagement.angle(tooth, phase);
-                let chip_per_feed = process.force.normal.at(angle).x * self.chip_slope(angle);
-                process.force.cutting.at(angle) * chip_per_feed
+                let port = self.port(tooth, phase);
+                port.force * port.normal.x
             })
             .sum()
     }

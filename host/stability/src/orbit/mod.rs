@@ -12,6 +12,7 @@ mod branch;
 mod branch_record;
 mod branches;
 mod choice;
+mod coefficients;
 mod collocated;
 mod collocation_matrix;
 mod criticality;
@@ -26,15 +27,19 @@ mod forced_method;
 mod pairing;
 mod parameter;
 mod periodic_orbit;
+mod ports;
 mod restoring;
 mod resumed_branch;
 mod revolution_period;
 mod subharmonic;
 mod tooth_period;
 mod tooth_period_map;
+mod torus;
 mod variation;
 mod varied_period;
 
+#[cfg(test)]
+mod coefficients_tests;
 #[cfg(test)]
 mod follower_tests;
 #[cfg(test)]
@@ -44,9 +49,11 @@ pub use branch::{Branch, BranchPoint, BrokenBranch, Event, Extent};
 pub use branch_record::{BranchJournal, BranchRecord, Unrecorded};
 pub use branches::{follow, follow_depth, follow_recorded};
 pub use choice::collocation_of;
+pub use coefficients::{Coefficients, Smoothing};
 pub use criticality::{Criticality, criticality};
 pub use equivalent::EquivalentProblem;
 pub use forced::ForcedProblem;
 pub use parameter::{Parameter, Place, Setting};
 pub use periodic_orbit::{Orbit, OrbitError};
 pub use subharmonic::{BrokenDoubledBranch, DoubledBranch, DoubledPoint, follow_doubled};
+pub use torus::{TorusBranch, TorusEnd, TorusPoint, follow_torus};

@@ -11,6 +11,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
+use super::coefficients::Coefficients;
 use super::collocated::Linearized;
 use super::forced::ForcedProblem;
 use quietcut_numerics::quadrature::Gauss;
@@ -33,7 +34,7 @@ pub(super) struct Subinterval {
     pub(super) turn: f64,
     /// Duration, s.
     pub(super) duration: f64,
-    /// Number of cutting teeth.
+    /// Number of cutting teeth; of [ports](super::ports::Port) with smoothed or averaged coefficients.
     pub(super) teeth: usize,
     /// Force per axial depth of feed and edges at the nodes of the subinterval, N/m.
     pub(super) forces: Vec<Vector3<f64>>,
@@ -95,12 +96,17 @@ impl<'a> ToothPeriod<'a> {
         let gauss = Gauss::new(NODES);
         let speed_rad_per_s = problem.speed_rad_per_s(linear.tooth_period_s(rpm));
         let mut subintervals = Vec::new();
-        for interval in engagement.subintervals() {
+        for interval in problem.parts() {
             let length = interval.to - interval.from;
             // Phase angle over the whole interval between entry and exit of teeth: that of the fastest pole, plus that
             // of the directional coefficients, which oscillate at twice the rotation of the tool.
             let angle = fastest * length * seconds_per_radian_of_mesh + 2.0 * length;
-            let count = (angle / subinterval_angle).ceil().max(1.0);
+            // A finer mesh divides the short parts at a smooth entry and exit too.
+            let least = match problem.coefficients {
+                Coefficients::Smoothed(_) => (SUBINTERVAL_ANGLE / subinterval_angle).floor().max(1.0),
+                Coefficients::Exact | Coefficients::Averaged => 1.0,
+            };
+            let count = (angle / subinterval_angle).ceil().max(least);
             let turn = length / count;
             for index in 0..count as usize {
                 let phase = interval.from + turn * index as f64;
@@ -108,13 +114,13 @@ impl<'a> ToothPeriod<'a> {
                     phase,
                     turn,
                     duration: turn * seconds_per_radian,
-                    teeth: interval.teeth,
+                    teeth: interval.ports,
                     damping: gauss
                         .nodes
                         .iter()
                         .filter_map(|node| {
                             let angles =
-                                (0..interval.teeth).map(|tooth| engagement.angle(tooth, phase + turn * node));
+                                (0..interval.ports).map(|tooth| engagement.angle(tooth, phase + turn * node));
                             let at = problem.damping_per_depth(angles, speed_rad_per_s)?;
                             Some(problem.damped(&at))
                         })
@@ -122,7 +128,7 @@ impl<'a> ToothPeriod<'a> {
                     forces: gauss
                         .nodes
                         .iter()
-                        .map(|node| problem.force_per_depth(interval.teeth, phase + turn * node))
+                        .map(|node| problem.force_per_depth(interval.ports, phase + turn * node))
                         .collect(),
                 });
             }
@@ -191,12 +197,11 @@ impl ToothPeriod<'_> {
     pub(super) fn chip_per_depth(&self, subinterval: &Subinterval, node: usize) -> DMatrix<f64> {
         let problem = self.problem;
         let structure = &problem.linear.structure;
-        let process = &problem.linear.process;
         let phase = subinterval.phase + subinterval.turn * self.gauss.nodes[node];
         let mut directional = Matrix3::zeros();
-        for tooth in 0..subinterval.teeth {
-            let angle = process.engagement.angle(tooth, phase);
-            directional += process.force.directional(angle) * problem.chip_slope(angle);
+        for port in 0..subinterval.teeth {
+            let port = problem.port(port, phase);
+            directional += port.force * port.normal.transpose();
         }
         &structure.b * directional * &structure.c
     }

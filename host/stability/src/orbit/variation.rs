@@ -51,16 +51,16 @@ fn element(
             1.0
         };
         for tooth in 0..teeth {
-            let angle = process.engagement.angle(tooth, phase);
             let port = j * teeth + tooth;
-            let force = process.force.cutting.at(angle) * (modulation * problem.chip_slope(angle));
+            let of_cut = problem.port(tooth, phase);
+            let force = of_cut.force * modulation;
             seen.row_mut(port)
-                .copy_from(&(process.force.normal.at(angle).transpose() * &structure.c));
+                .copy_from(&(of_cut.normal.transpose() * &structure.c));
             push.column_mut(port).copy_from(&(&structure.b * force));
             ports.push(Port {
                 time_s: phase * seconds_per_radian,
                 weight_s: gauss.weights[j] * subinterval.duration,
-                normal: process.force.normal.at(angle),
+                normal: of_cut.normal,
                 force,
             });
         }

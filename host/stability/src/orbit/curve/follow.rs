@@ -3,7 +3,6 @@
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::DVector;
-use num_complex::Complex64;
 
 use super::super::forced::ForcedProblem;
 use super::super::parameter::{Parameter, Setting};
@@ -75,6 +74,11 @@ pub fn follow_curve(
         .chain(&after)
         .flat_map(|record| record.resonances.iter().copied())
         .collect();
+    let doubles = orbits
+        .iter()
+        .chain(&after)
+        .filter_map(|record| record.double)
+        .collect();
     orbits.push(follower.record(None, &start, CURVE_STEP_FIRST));
     orbits.extend(after);
     Ok(Curve {
@@ -84,6 +88,7 @@ pub fn follow_curve(
         parameters: plane.parameters,
         points: orbits.iter().map(|record| record.point).collect(),
         resonances,
+        doubles,
         ends: [first_end, last_end],
         error: follower.error(&orbits),
     })
@@ -109,9 +114,9 @@ fn check(problem: &ForcedProblem, plane: Plane) -> Result<(), CurveError> {
     Ok(())
 }
 
-struct CurveFollower<'a> {
-    system: &'a ExtendedSystem<'a>,
-    corrector: Corrector<'a>,
+pub(super) struct CurveFollower<'a> {
+    pub(super) system: &'a ExtendedSystem<'a>,
+    pub(super) corrector: Corrector<'a>,
     plane: Plane,
 }
 
@@ -182,6 +187,10 @@ impl<'a> CurveFollower<'a> {
                 .ok_or_else(|| CurveError::Journal {
                     reason: "the recorded orbits are none of this curve".into(),
                 })?;
+        let mut outside = match records.last() {
+            Some(last) => last.point.outside,
+            None => self.outside(&first),
+        };
         for _ in records.len()..STEPS_MAX {
             let Some(next) = self.next(&here, before.as_ref(), &mut step) else {
                 return Ok((records, CurveEnd::Lost));
@@ -202,7 +211,8 @@ impl<'a> CurveFollower<'a> {
                 .map_or(1.0, |next| if next.newton_steps > 4 { 0.7 } else { 1.5 });
             let next_step = (step * ideal.clamp(0.5, most)).min(CURVE_STEP_MAX);
             if let Some(found) = found {
-                let record = self.record(Some(&here), &found, next_step);
+                let record = self.record(Some((&here, outside)), &found, next_step);
+                outside = record.point.outside;
                 if end.is_none() {
                     let kept = journal.record(side, &record);
                     kept.map_err(|reason| CurveError::Journal { reason })?;
@@ -288,14 +298,17 @@ impl<'a> CurveFollower<'a> {
         Some((self.realigned(restored(last)?), Some(before), last.next_step))
     }
 
-    fn record(&self, from: Option<&CurveOrbit>, orbit: &CurveOrbit, next_step: f64) -> CurveRecord {
+    /// Record of an orbit; `from` is the one before it, with the number of its other multipliers outside the unit circle.
+    fn record(&self, from: Option<(&CurveOrbit, i32)>, orbit: &CurveOrbit, next_step: f64) -> CurveRecord {
+        let point = self.point(orbit);
         CurveRecord {
             unknowns: orbit.orbit.unknowns.as_slice().to_vec(),
             along: orbit.along.as_slice().to_vec(),
             phase: orbit.phase.as_slice().to_vec(),
             next_step,
-            point: self.point(orbit),
-            resonances: from.map_or_else(Vec::new, |from| self.resonances(from, orbit)),
+            point,
+            resonances: from.map_or_else(Vec::new, |(from, _)| self.resonances(from, orbit)),
+            double: from.and_then(|(from, outside)| self.double([from, orbit], [outside, point.outside])),
         }
     }
 
@@ -378,7 +391,7 @@ impl<'a> CurveFollower<'a> {
             .collect()
     }
 
-    fn point(&self, orbit: &CurveOrbit) -> CurvePoint {
+    pub(super) fn point(&self, orbit: &CurveOrbit) -> CurvePoint {
         let system = self.system;
         let setting = system.setting_of(&orbit.orbit.unknowns);
         let angle = system.angle_of(&orbit.orbit.unknowns).0;
@@ -387,35 +400,17 @@ impl<'a> CurveFollower<'a> {
             rotation: (per_tooth * system.base.linear.teeth as f64).fract(),
             rotation_per_tooth: per_tooth,
             amplitude_mm: system.base.amplitude_mm(&orbit.orbit.states),
-            outside: self.outside(&setting, orbit, angle),
+            outside: self.outside(orbit),
             setting,
         }
     }
 
     /// Number of multipliers outside the unit circle, other than the critical ones; −1 if they cannot be computed.
-    fn outside(&self, setting: &Setting, orbit: &CurveOrbit, angle: f64) -> i32 {
-        let problem = self.system.base.at(setting);
-        let map = self.system.period(&problem, setting.rpm);
-        let Ok(mut multipliers) = map.multipliers_about(&orbit.orbit.states, setting.depth_m()) else {
-            return -1;
-        };
-        let critical = Complex64::from_polar(1.0, angle);
-        for critical in [critical, critical.conj()]
-            .iter()
-            .take(self.system.kind.count() as usize)
-        {
-            let nearest = multipliers
-                .iter()
-                .enumerate()
-                .min_by(|(_, a), (_, b)| (*a - critical).norm().total_cmp(&(*b - critical).norm()));
-            if let Some((index, _)) = nearest {
-                multipliers.swap_remove(index);
-            }
-        }
-        multipliers
-            .iter()
-            .filter(|multiplier| multiplier.norm() > 1.0)
-            .count() as i32
+    fn outside(&self, orbit: &CurveOrbit) -> i32 {
+        let others = self.others(orbit);
+        others.map_or(-1, |others| {
+            others.iter().filter(|other| other.norm() > 1.0).count() as i32
+        })
     }
 
     /// See [`Curve::error`].

@@ -9,6 +9,7 @@
 //! tool with an even number of teeth it would be +1.
 
 mod criteria;
+mod doubles;
 mod error;
 mod extended;
 mod follow;
@@ -20,10 +21,13 @@ mod start;
 #[cfg(test)]
 mod brute_force_tests;
 #[cfg(test)]
-mod tests;
+mod cost_tests;
+#[cfg(test)]
+pub(super) mod tests;
 
 pub use error::CurveError;
 pub use follow::follow_curve;
 pub use points::{
-    Curve, CurveEnd, CurveJournal, CurvePoint, CurveRecord, CurveSeed, NoJournal, Plane, Resonance,
+    Curve, CurveEnd, CurveJournal, CurvePoint, CurveRecord, CurveSeed, DoubleLoss, NoJournal, Plane,
+    Resonance,
 };

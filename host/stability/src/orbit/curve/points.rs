@@ -45,6 +45,18 @@ pub struct Resonance {
     pub point: CurvePoint,
 }
 
+/// Point of a curve at which another multiplier meets the unit circle too (bifurcation of codimension two).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DoubleLoss {
+    /// Kind of the other loss.
+    pub other: StabilityLoss,
+    /// Rotation of the other multiplier per tooth, θ/2π.
+    pub other_rotation_per_tooth: f64,
+    /// The orbit.
+    #[serde(flatten)]
+    pub point: CurvePoint,
+}
+
 /// Reason why a side of a curve ends.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -70,6 +82,8 @@ pub struct Curve {
     pub points: Vec<CurvePoint>,
     /// Strong resonances on the curve, in its order.
     pub resonances: Vec<Resonance>,
+    /// Points at which another multiplier meets the unit circle, in the order of the curve.
+    pub doubles: Vec<DoubleLoss>,
     /// Reasons why the curve ends at the first and at the last point.
     pub ends: [CurveEnd; 2],
     /// State of the orbit at the start of the period, at the first and at the last point.
@@ -172,6 +186,9 @@ pub struct CurveRecord {
     pub(super) point: CurvePoint,
     /// Strong resonances on the step that led to this orbit.
     pub(super) resonances: Vec<Resonance>,
+    /// Point on that step at which another multiplier meets the unit circle.
+    #[serde(default)]
+    pub(super) double: Option<DoubleLoss>,
 }
 
 /// Where the orbits of a curve are recorded while it is followed, so that an interrupted computation can go on.

@@ -12,7 +12,7 @@ use super::points::{Curve, CurveEnd, CurveJournal, CurveRecord, CurveSeed, NoJou
 use crate::spectrum::stability_loss::StabilityLoss;
 
 /// Spindle speed, rev/min, of a tooth period τ in the dimensionless units of chapter 6.
-pub(super) fn rpm(tau: f64) -> f64 {
+pub(in crate::orbit) fn rpm(tau: f64) -> f64 {
     30.0 * NATURAL_RAD_PER_S / tau
 }
 
@@ -20,7 +20,7 @@ pub(super) fn rpm(tau: f64) -> f64 {
 const NATURAL_RAD_PER_S: f64 = 109.641_6;
 
 /// Factor from depth in mm to the dimensionless depth w of chapter 6: K_tc/k_yy = 76 MPa / 2.26 MN/m.
-pub(super) const W_PER_MM: f64 = 76.0 / 2260.0;
+pub(in crate::orbit) const W_PER_MM: f64 = 76.0 / 2260.0;
 
 fn full() -> ForcedProblem {
     ForcedProblem::new(&quietcut_testkit::case("kuka-kr90-full-cubic")).unwrap()
@@ -126,6 +126,37 @@ fn the_second_torus_ends_near_8_56_where_its_multipliers_meet_at_minus_one() {
     println!("flip island from τ {low:.6} to {high:.6}, {:?}", island.ends);
     assert_eq!(island.ends, [CurveEnd::Closed; 2]);
     assert!(8.56 < low && high < 8.57, "{low} {high}");
+}
+
+#[test]
+fn torus_curves_have_the_double_hopf_points_of_another_program() {
+    // Without feed the orbit is rest. References: characteristic matrix and collocation of the linear problem.
+    for (name, tau, w) in [
+        ("kuka-kr90-full", 6.0428, 0.39987),
+        ("kuka-kr90-half", 6.0548, 0.35043),
+    ] {
+        let problem = ForcedProblem::new(&quietcut_testkit::case(name)).unwrap();
+        let curve = curve_from(&problem, 5.9, StabilityLoss::Hopf, depth_and_speed(5.8, 6.2));
+        for double in &curve.doubles {
+            let at = &double.point.setting;
+            println!(
+                "{name}: {:?} at τ {:.5}, w {:.6}",
+                double.other,
+                rpm(1.0) / at.rpm,
+                at.depth_mm * W_PER_MM
+            );
+        }
+        let found = curve
+            .doubles
+            .iter()
+            .find(|double| double.other == StabilityLoss::Hopf && double.point.outside == 0)
+            .unwrap();
+        let at = &found.point.setting;
+        // The digits of the references.
+        assert!((rpm(1.0) / at.rpm - tau).abs() < 1e-4, "{name}: {found:?}");
+        assert!((at.depth_mm * W_PER_MM - w).abs() < 2e-5, "{name}: {found:?}");
+        assert!((found.other_rotation_per_tooth - found.point.rotation_per_tooth).abs() > 0.01);
+    }
 }
 
 #[test]

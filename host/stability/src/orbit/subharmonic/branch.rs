@@ -7,6 +7,7 @@ use super::start::{beside, repeated};
 use crate::limits::speed_line::union;
 use crate::orbit::branch::{Branch, BrokenBranch, Event, Extent};
 use crate::orbit::branch_record::{BranchJournal, BranchRecord};
+use crate::orbit::coefficients::Coefficients;
 use crate::orbit::follower::Follower;
 use crate::orbit::forced::ForcedProblem;
 use crate::orbit::parameter::{Parameter, Setting};
@@ -128,6 +129,8 @@ fn check(problem: &ForcedProblem, flip: &Event) -> Result<(), OrbitError> {
         "doubled orbits from another event than a flip"
     } else if problem.is_over_revolution() {
         "doubled orbits of teeth with unequal pitch or runout; leave out runout and unequal pitch"
+    } else if problem.coefficients != Coefficients::Exact {
+        "doubled orbits with smoothed or averaged coefficients; use the exact ones"
     } else if problem.chip_exponent().is_some() {
         "doubled orbits with extension.force-exponent; leave it out"
     } else if problem.linear.process.axial_depth_modulation {

@@ -61,10 +61,9 @@ fn near_the_flip_the_doubling_has_the_size_of_the_normal_form() {
             "{rpm} rev/min, {} mm: {followed_mm} mm, normal form {predicted_mm} mm",
             at.value
         );
-        // At 2010 rev/min both differ in proportion to the distance from the flip, here by 2 %. At 1980 rev/min, near the
-        // speed at which the flip changes its criticality and the cubic coefficient vanishes, they differ by 5 % at any
-        // distance; the reason is open.
-        assert!((followed_mm / predicted_mm - 1.0).abs() < 0.05);
+        // Both differ in proportion to the distance from the flip: by 2 % at 2010 rev/min, and by 0.1 % at 1980 rev/min.
+        let room = if is_supercritical { 0.005 } else { 0.03 };
+        assert!((followed_mm / predicted_mm - 1.0).abs() < room);
     }
 }
 
@@ -136,4 +135,33 @@ fn other_events_are_refused() {
         refused.unwrap_err().cause,
         OrbitError::NotCovered { .. }
     ));
+}
+
+#[test]
+#[ignore = "exploration"]
+fn explore_normal_form() {
+    let problem = hardening();
+    let range = [0.0, 3.0];
+    for rpm in [1930.0, 1950.0, 1965.0, 1975.0, 1980.0, 1985.0, 1995.0, 2010.0] {
+        let setting = problem.setting(rpm, 0.0);
+        let (branch, doubled) = doubled_of(&problem, setting, Parameter::Depth, range);
+        let flip = &branch.events[0];
+        let found = criticality(&problem, setting, Parameter::Depth, range, flip).unwrap();
+        println!(
+            "{rpm}: flip {} error {} coefficient {}",
+            flip.value, flip.error, found.coefficient
+        );
+        for (index, at) in doubled.branch.points.iter().enumerate().take(14) {
+            let up_to = [0.0, at.value];
+            let forced = follow(&problem, setting, Parameter::Depth, up_to, Extent::Whole).unwrap();
+            let excess = forced.points.last().unwrap().multiplier_abs - 1.0;
+            let z = doubling_mm(&doubled, index) / found.mode_mm[0];
+            println!(
+                "   {:.3e} excess {excess:.4e} z {z:.4e} c {:.6e} chip {}",
+                at.value / flip.value - 1.0,
+                -excess / (z * z),
+                doubled.points[index].smallest_chip_mm
+            );
+        }
+    }
 }
