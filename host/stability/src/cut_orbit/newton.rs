@@ -8,8 +8,11 @@
 //!
 //! where J_e is the jump of f at the event e, whose delay by δt_e is an impulse −J_e δt_e with the response G_e, and
 //! g_e(t_e, y) = 0 defines its instant.
+//!
+//! The inputs at a node often depend on few combinations of the motion: on the chip of each tooth that cuts. With Φ' = B R,
+//! node by node, R of full rank, δf = B q + b is found from q = R G (B q + b) alone, where b is what changes explicitly.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::events::{Events, Revolution};
 use super::jumps::{Jump, JumpSize};
@@ -18,67 +21,104 @@ use super::mesh::{Mesh, Stretches};
 use super::model::{CutModel, Ports};
 use super::motion::Motion;
 use super::period::{Period, SparseRow};
-use super::response::Response;
+use super::response::{Driven, Response};
 use quietcut_numerics::lu::Lu;
+
+/// Length of a row of Φ' that the rows before it do not give, over its own, below which it is a combination of them.
+const DEPENDENT: f64 = 1e-12;
 
 /// The equations of a Newton step, factored.
 pub(super) struct Linearization {
-    /// First column of the inputs of each subinterval; `None` where no force acts.
-    first_column: Vec<Option<usize>>,
+    response: Response,
+    /// What the unknowns of each subinterval do; `None` where no force acts.
+    driven: Vec<Option<Driven>>,
+    /// Number of unknowns besides the instants of events.
     count: usize,
-    /// Inputs at the nodes by outputs at the points.
-    inputs_by: Vec<SparseRow>,
+    /// R: unknowns by outputs at the points.
+    condensed_by: Vec<SparseRow>,
     /// Cutting forces at the nodes by outputs at the points.
     cutting_by: Vec<SparseRow>,
     jumps: Vec<Jump>,
     /// Outputs by unknowns.
-    response: DMatrix<f64>,
+    by_unknowns: DMatrix<f64>,
     factors: Lu,
 }
 
 impl Period<'_> {
-    /// Rows of the cutting force (three) and of the inputs at one instant, whose outputs are those of `point`.
-    fn rows(&self, slopes: &Slopes, point: usize) -> (Vec<SparseRow>, Vec<SparseRow>) {
-        let cutting = |axis: usize| {
+    /// Rows of the cutting force at one instant, whose outputs are those of `point`.
+    fn cutting_rows(&self, slopes: &Slopes, point: usize) -> [SparseRow; 3] {
+        std::array::from_fn(|axis| {
             let mut row = self.own_row(point, slopes.cutting.row(axis).iter().copied());
             for (time_s, by) in &slopes.earlier {
                 self.add_earlier(&mut row, *time_s, by.row(axis).transpose());
             }
             row
-        };
-        let by_own = &slopes.inputs + &slopes.by_cutting * &slopes.cutting;
-        let input = |input: usize| {
-            let mut row = self.own_row(point, by_own.row(input).iter().copied());
-            let by_cutting = slopes.by_cutting.row(input);
-            for (time_s, by) in &slopes.earlier {
-                let weights: Matrix3<f64> = *by;
-                let weights = weights.transpose() * Vector3::from_fn(|axis, _| by_cutting[axis]);
-                self.add_earlier(&mut row, *time_s, weights);
+        })
+    }
+
+    /// B and R of one instant, whose outputs are those of `point`: the rows of Φ', orthogonalized one after the other.
+    fn condensed(&self, slopes: &Slopes, point: usize, sizes: &[f64]) -> (DMatrix<f64>, Vec<SparseRow>) {
+        let (inputs, outputs) = (self.ports.inputs(), self.ports.outputs());
+        let width = outputs + 3 * slopes.earlier.len();
+        // In units of the size of each output.
+        let mut unit = vec![1.0; width];
+        for (unit, size) in unit.iter_mut().zip(sizes) {
+            *unit = size.max(f64::MIN_POSITIVE.sqrt());
+        }
+        for earlier in unit[outputs..].chunks_exact_mut(3) {
+            for (index, axis) in self.ports.axes.iter().enumerate() {
+                earlier[*axis] = sizes[index].max(f64::MIN_POSITIVE.sqrt());
             }
-            row
-        };
-        (
-            (0..3).map(cutting).collect(),
-            (0..self.ports.inputs()).map(input).collect(),
-        )
+        }
+        let mut rest = DMatrix::zeros(inputs, width);
+        rest.columns_mut(0, outputs)
+            .copy_from(&(&slopes.inputs + &slopes.by_cutting * &slopes.cutting));
+        for (index, (_, by)) in slopes.earlier.iter().enumerate() {
+            rest.columns_mut(outputs + 3 * index, 3)
+                .copy_from(&(&slopes.by_cutting * by));
+        }
+        for (mut column, unit) in rest.column_iter_mut().zip(&unit) {
+            column *= *unit;
+        }
+        let whole: Vec<f64> = rest.row_iter().map(|row| row.norm()).collect();
+        let mut basis: Vec<DVector<f64>> = Vec::new();
+        let mut rows = Vec::new();
+        for index in 0..inputs {
+            let row = rest.row(index).clone_owned();
+            let square = row.norm_squared();
+            if square.sqrt() <= DEPENDENT * whole[index] || square == 0.0 {
+                continue;
+            }
+            let shares = &rest * row.transpose() / square;
+            rest -= &shares * &row;
+            basis.push(shares);
+            let weights: Vec<f64> = row.iter().zip(&unit).map(|(value, unit)| value / unit).collect();
+            let mut sparse = self.own_row(point, weights[..outputs].iter().copied());
+            for ((time_s, _), weights) in slopes.earlier.iter().zip(weights[outputs..].chunks_exact(3)) {
+                self.add_earlier(&mut sparse, *time_s, Vector3::from_column_slice(weights));
+            }
+            rows.push(sparse);
+        }
+        let basis = DMatrix::from_fn(inputs, basis.len(), |input, unknown| basis[unknown][input]);
+        (basis, rows)
     }
 
     /// The equations of a Newton step about the motion; `None` if they are singular.
-    pub(super) fn linearized(&self, response: &Response<'_>) -> Option<Linearization> {
+    pub(super) fn linearized(&self, response: Response) -> Option<Linearization> {
         let (inputs, nodes) = (self.ports.inputs(), self.mesh.nodes());
         let sizes = self.motion.sizes();
         let path = self.path();
-        let mut count = 0;
-        let mut first_column = Vec::with_capacity(self.mesh.subintervals.len());
-        let (mut cutting_by, mut inputs_by) = (Vec::new(), Vec::new());
+        let mut driven = Vec::with_capacity(self.mesh.subintervals.len());
+        let (mut cutting_by, mut condensed_by) = (Vec::new(), Vec::new());
         for (index, subinterval) in self.mesh.subintervals.iter().enumerate() {
-            let driven = self.is_driven(index);
-            first_column.push(driven.then_some(count));
+            if !self.is_driven(index) {
+                driven.push(None);
+                cutting_by.extend(std::iter::repeat_n(Vec::new(), 3 * nodes));
+                continue;
+            }
+            let first_column = condensed_by.len();
+            let mut bases = Vec::with_capacity(nodes);
             for node in 0..nodes {
-                if !driven {
-                    cutting_by.extend([const { Vec::new() }; 3]);
-                    continue;
-                }
                 let point = self.mesh.point(index, node + 1);
                 let slopes = self.model.slopes(
                     self.ports,
@@ -90,33 +130,44 @@ impl Period<'_> {
                     },
                     &sizes,
                 );
-                let (of_cutting, of_inputs) = self.rows(&slopes, point);
-                cutting_by.extend(of_cutting);
-                inputs_by.extend(of_inputs);
+                cutting_by.extend(self.cutting_rows(&slopes, point));
+                let (basis, rows) = self.condensed(&slopes, point, &sizes);
+                condensed_by.extend(rows);
+                bases.push(basis);
             }
-            count += if driven { nodes * inputs } else { 0 };
+            let mut basis = DMatrix::zeros(nodes * inputs, condensed_by.len() - first_column);
+            let mut column = 0;
+            for (node, own) in bases.iter().enumerate() {
+                basis
+                    .view_mut((node * inputs, column), own.shape())
+                    .copy_from(own);
+                column += own.ncols();
+            }
+            driven.push(Some(Driven { first_column, basis }));
         }
+        let count = condensed_by.len();
         let jumps = self.jumps(&sizes);
         let impulses: Vec<_> = jumps
             .iter()
             .map(|jump| (jump.size.subinterval, -&jump.size.inputs))
             .collect();
-        let matrix = response.matrix(&first_column, count, &impulses);
-        let factors = Lu::new(self.equations(&inputs_by, &jumps, count, &matrix));
+        let by_unknowns = response.matrix(&driven, count, &impulses);
+        let factors = Lu::new(self.equations(&condensed_by, &jumps, count, &by_unknowns));
         factors.is_regular().then_some(Linearization {
-            first_column,
+            response,
+            driven,
             count,
-            inputs_by,
+            condensed_by,
             cutting_by,
             jumps,
-            response: matrix,
+            by_unknowns,
             factors,
         })
     }
 
     fn equations(
         &self,
-        inputs_by: &[SparseRow],
+        condensed_by: &[SparseRow],
         jumps: &[Jump],
         count: usize,
         matrix: &DMatrix<f64>,
@@ -127,7 +178,7 @@ impl Period<'_> {
         for (column, of_column) in matrix.column_iter().enumerate() {
             let of_column = of_column.as_slice();
             let mut left = equations.column_mut(column);
-            for (row, weights) in inputs_by.iter().enumerate() {
+            for (row, weights) in condensed_by.iter().enumerate() {
                 left[row] -= weights
                     .iter()
                     .map(|(at, weight)| weight * of_column[*at])
@@ -159,27 +210,28 @@ pub(super) struct Change {
 }
 
 impl Linearization {
-    /// Inputs where no force acts on the orbit; `None` if all are zero.
-    pub(super) fn undriven(&self, mesh: &Mesh, ports: &Ports, inputs: &[f64]) -> Option<Vec<f64>> {
-        let per_subinterval = mesh.nodes() * ports.inputs();
-        let mut undriven = inputs.to_vec();
-        for (own, first) in undriven.chunks_exact_mut(per_subinterval).zip(&self.first_column) {
-            if first.is_some() {
-                own.fill(0.0);
-            }
+    /// Change of an orbit whose inputs change by `inputs` at all nodes, and its event functions by −`events`.
+    pub(super) fn changed(&self, mesh: &Mesh, inputs: &[f64], events: &[f64]) -> Option<Change> {
+        let moved = self.response.outputs(inputs);
+        let events: Vec<f64> = events
+            .iter()
+            .zip(self.of_events(&moved))
+            .map(|(event, by)| event - by)
+            .collect();
+        let mut change = self.solve(mesh, self.of_unknowns(&moved), &events)?;
+        for (sum, own) in change.inputs.iter_mut().zip(inputs) {
+            *sum += own;
         }
-        undriven.iter().any(|input| *input != 0.0).then_some(undriven)
+        for (sum, own) in change.outputs.iter_mut().zip(&moved) {
+            *sum += own;
+        }
+        Some(change)
     }
 
-    /// Solves the equations for right-hand sides: `inputs` at the driven nodes, and `events` for each jump.
-    pub(super) fn solve(&self, mesh: &Mesh, ports: &Ports, inputs: &[f64], events: &[f64]) -> Option<Change> {
-        let per_subinterval = mesh.nodes() * ports.inputs();
+    /// Solves the equations for right-hand sides of the unknowns, and `events` for each jump.
+    fn solve(&self, mesh: &Mesh, unknowns: Vec<f64>, events: &[f64]) -> Option<Change> {
         let mut right = DMatrix::zeros(self.count + self.jumps.len(), 1);
-        for (index, first) in self.first_column.iter().enumerate() {
-            let Some(first) = first else { continue };
-            let own = &inputs[index * per_subinterval..(index + 1) * per_subinterval];
-            right.rows_mut(*first, per_subinterval).copy_from_slice(own);
-        }
+        right.rows_mut(0, self.count).copy_from_slice(&unknowns);
         for (index, (jump, event)) in self.jumps.iter().zip(events).enumerate() {
             right[self.count + index] = event / (jump.rate * mesh.revolution_s);
         }
@@ -188,43 +240,45 @@ impl Linearization {
             return None;
         }
         let right = right.column(0);
-        let mut all_inputs = vec![0.0; inputs.len()];
-        for (index, first) in self.first_column.iter().enumerate() {
-            let Some(first) = first else { continue };
-            all_inputs[index * per_subinterval..(index + 1) * per_subinterval]
-                .copy_from_slice(right.rows(*first, per_subinterval).as_slice());
+        let mut inputs = Vec::new();
+        for driven in &self.driven {
+            let per_subinterval = self.response.inputs_of_subinterval();
+            match driven {
+                Some(Driven { first_column, basis }) => {
+                    inputs.extend((basis * right.rows(*first_column, basis.ncols())).iter());
+                }
+                None => inputs.resize(inputs.len() + per_subinterval, 0.0),
+            }
         }
         Some(Change {
-            inputs: all_inputs,
+            inputs,
             delays_s: right.rows(self.count, self.jumps.len()).iter().copied().collect(),
-            outputs: &self.response * right,
+            outputs: &self.by_unknowns * right,
         })
+    }
+
+    /// R applied to a change of the outputs.
+    fn of_unknowns(&self, outputs: &[f64]) -> Vec<f64> {
+        self.condensed_by
+            .iter()
+            .map(|row| applied(row, outputs))
+            .collect()
+    }
+
+    /// Change of the event functions by a change of the outputs.
+    fn of_events(&self, outputs: &[f64]) -> Vec<f64> {
+        self.jumps
+            .iter()
+            .map(|jump| applied(&jump.row, outputs))
+            .collect()
     }
 
     /// Change of the cutting forces at all nodes by a change of the outputs, N.
     pub(super) fn cutting_n(&self, outputs: &[f64]) -> Vec<[f64; 3]> {
-        let of_row = |row: &SparseRow| row.iter().map(|(at, weight)| weight * outputs[*at]).sum::<f64>();
         self.cutting_by
             .chunks_exact(3)
-            .map(|rows| std::array::from_fn(|axis| of_row(&rows[axis])))
+            .map(|rows| std::array::from_fn(|axis| applied(&rows[axis], outputs)))
             .collect()
-    }
-
-    /// Inputs at the driven nodes and event functions by a change of the outputs.
-    pub(super) fn applied(&self, mesh: &Mesh, ports: &Ports, outputs: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let of_row = |row: &SparseRow| row.iter().map(|(at, weight)| weight * outputs[*at]).sum::<f64>();
-        let per_subinterval = mesh.nodes() * ports.inputs();
-        let mut inputs = vec![0.0; self.first_column.len() * per_subinterval];
-        for (index, first) in self.first_column.iter().enumerate() {
-            let Some(first) = first else { continue };
-            for (offset, row) in self.inputs_by[*first..*first + per_subinterval]
-                .iter()
-                .enumerate()
-            {
-                inputs[index * per_subinterval + offset] = of_row(row);
-            }
-        }
-        (inputs, self.jumps.iter().map(|jump| of_row(&jump.row)).collect())
     }
 
     /// Sizes of the jumps.
@@ -248,6 +302,10 @@ impl Linearization {
         };
         self.jumps.iter().map(of).collect()
     }
+}
+
+fn applied(row: &SparseRow, outputs: &[f64]) -> f64 {
+    row.iter().map(|(at, weight)| weight * outputs[*at]).sum()
 }
 
 /// Result of a Newton step.
@@ -276,23 +334,20 @@ pub(super) fn step(
         motion,
     };
     let response = Response::new(mesh, ports)?;
-    let linearized = period.linearized(&response)?;
     let answered = response.outputs(&period.forces().inputs);
-    let residual: Vec<f64> = motion
-        .values
+    let linearized = period.linearized(response)?;
+    let missed_by: Vec<f64> = answered
         .iter()
-        .zip(&answered)
-        .map(|(y, answer)| y - answer)
+        .zip(&motion.values)
+        .map(|(answer, y)| answer - y)
         .collect();
-    let (inputs, events) = linearized.applied(mesh, ports, &residual);
-    let missed = linearized.conditions(&period);
-    let events: Vec<f64> = events
+    let events: Vec<f64> = linearized
+        .of_events(&missed_by)
         .iter()
-        .zip(missed)
-        .map(|(event, missed)| event - missed)
+        .zip(linearized.conditions(&period))
+        .map(|(event, missed)| -event - missed)
         .collect();
-    let minus: Vec<f64> = inputs.iter().map(|x| -x).collect();
-    let change = linearized.solve(mesh, ports, &minus, &events)?;
+    let change = linearized.solve(mesh, linearized.of_unknowns(&missed_by), &events)?;
     let mut next = motion.clone();
     for ((value, answer), change) in next.values.iter_mut().zip(&answered).zip(change.outputs.iter()) {
         *value += share * (answer + change - *value);

@@ -364,7 +364,7 @@ impl Start {
         };
         let linearized = match linearized {
             Some(linearized) => linearized,
-            None => period.linearized(&Response::new(&self.mesh, ports)?)?,
+            None => period.linearized(Response::new(&self.mesh, ports)?)?,
         };
         Some(CutOrbit {
             forces: period.forces(),

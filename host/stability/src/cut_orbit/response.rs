@@ -12,9 +12,12 @@ use super::propagator::SubintervalResponse;
 
 /// The linear map from the inputs at the nodes of a mesh to the outputs at its points, over a revolution after which
 /// the states repeat. Between nodes the inputs are polynomials; the response to these is exact.
-pub(super) struct Response<'a> {
-    mesh: &'a Mesh,
-    ports: &'a Ports,
+pub(super) struct Response {
+    nodes: usize,
+    inputs: usize,
+    /// Input and output matrix of the structure.
+    b: DMatrix<f64>,
+    output: DMatrix<f64>,
     parts: Vec<Arc<Part>>,
     /// Factors of I − Φ, with the map Φ of the states over the revolution.
     closure: LU<f64, Dyn, Dyn>,
@@ -43,10 +46,16 @@ impl Part {
     }
 }
 
-impl<'a> Response<'a> {
+/// What the unknowns of a subinterval do: their first column, and the inputs at its nodes by them, node by node.
+pub(super) struct Driven {
+    pub(super) first_column: usize,
+    pub(super) basis: DMatrix<f64>,
+}
+
+impl Response {
     /// `None` if the structure has no periodic response: it has an undamped mode at a multiple of the spindle
     /// frequency, or can drift away.
-    pub(super) fn new(mesh: &'a Mesh, ports: &'a Ports) -> Option<Self> {
+    pub(super) fn new(mesh: &Mesh, ports: &Ports) -> Option<Self> {
         // Stretches of equal length differ by rounding only.
         let unit_s = mesh.revolution_s * super::mesh::SAME_TIME;
         let mut known: HashMap<u64, Arc<Part>> = HashMap::new();
@@ -68,9 +77,11 @@ impl<'a> Response<'a> {
         }
         let closure = (DMatrix::identity(size, size) - map).lu();
         let is_regular = closure.solve(&DVector::from_element(size, 1.0))?;
-        is_regular.iter().all(|x| x.is_finite()).then_some(Self {
-            mesh,
-            ports,
+        is_regular.iter().all(|x| x.is_finite()).then(|| Self {
+            nodes: mesh.nodes(),
+            inputs: ports.inputs(),
+            b: ports.b.clone(),
+            output: ports.output.clone(),
             parts,
             closure,
         })
@@ -78,23 +89,23 @@ impl<'a> Response<'a> {
 
     /// Outputs at all points, point by point, under the inputs `inputs` at all nodes, node by node.
     pub(super) fn outputs(&self, inputs: &[f64]) -> Vec<f64> {
-        let per_subinterval = self.mesh.nodes() * self.ports.inputs();
+        let per_subinterval = self.inputs_of_subinterval();
         let columns = |subinterval: usize| {
             DVector::from_column_slice(
                 &inputs[subinterval * per_subinterval..(subinterval + 1) * per_subinterval],
             )
         };
-        let mut state = DVector::zeros(self.ports.a.nrows());
+        let mut state = DVector::zeros(self.b.nrows());
         for (index, part) in self.parts.iter().enumerate() {
             let (e, w) = &part.states.at_end;
             state = e * state + w * columns(index);
         }
         // The closure was seen to be regular.
         state = self.closure.solve(&state).unwrap_or(state);
-        let mut outputs = Vec::with_capacity(self.mesh.points() * self.ports.outputs());
+        let mut outputs = Vec::with_capacity(self.points() * self.output.nrows());
         for (index, part) in self.parts.iter().enumerate() {
             let forces = columns(index);
-            outputs.extend((&self.ports.output * &state).iter());
+            outputs.extend((&self.output * &state).iter());
             for (e, w) in &part.outputs {
                 outputs.extend((e * &state + w * &forces).iter());
             }
@@ -104,56 +115,67 @@ impl<'a> Response<'a> {
         outputs
     }
 
-    /// Matrix from unknowns to outputs, (points · outputs) × unknowns. An unknown is an input at a node of a subinterval
-    /// whose first column is in `first_column`, or the amount of an impulse: `impulses` holds for each the subinterval
-    /// at whose start it acts and its direction, and follow after `count` inputs.
+    /// Number of inputs at the nodes of a subinterval.
+    pub(super) fn inputs_of_subinterval(&self) -> usize {
+        self.nodes * self.inputs
+    }
+
+    /// Number of points: the start and the nodes of every subinterval.
+    fn points(&self) -> usize {
+        self.parts.len() * (self.nodes + 1)
+    }
+
+    /// Matrix from unknowns to outputs, (points · outputs) × unknowns. `driven` says what the unknowns of each subinterval
+    /// do, `count` in all; `impulses` holds for each further unknown, the amount of an impulse, the subinterval at whose
+    /// start it acts and its direction.
     pub(super) fn matrix(
         &self,
-        first_column: &[Option<usize>],
+        driven: &[Option<Driven>],
         count: usize,
         impulses: &[(usize, DVector<f64>)],
     ) -> DMatrix<f64> {
-        let size = self.ports.a.nrows();
         let columns = count + impulses.len();
+        let add = |rows: &mut nalgebra::DMatrixViewMut<'_, f64>, by_inputs: &DMatrix<f64>, index: usize| {
+            if let Some(Driven { first_column, basis }) = &driven[index] {
+                rows.columns_mut(*first_column, basis.ncols())
+                    .gemm(1.0, by_inputs, basis, 1.0);
+            }
+        };
         let advance = |states: &mut DMatrix<f64>, index: usize| {
             let (e, w) = &self.parts[index].states.at_end;
             let mut next = e * &*states;
-            if let Some(first) = first_column[index] {
-                let mut own = next.columns_mut(first, w.ncols());
-                own += w;
-            }
+            add(&mut next.as_view_mut(), w, index);
             *states = next;
         };
         let strike = |states: &mut DMatrix<f64>, index: usize| {
             for (number, (subinterval, direction)) in impulses.iter().enumerate() {
                 if *subinterval == index {
                     let mut own = states.column_mut(count + number);
-                    own += &self.ports.b * direction;
+                    own += &self.b * direction;
                 }
             }
         };
-        let mut states = DMatrix::zeros(size, columns);
+        let mut states = DMatrix::zeros(self.b.nrows(), columns);
         for index in 0..self.parts.len() {
             strike(&mut states, index);
             advance(&mut states, index);
         }
         self.closure.solve_mut(&mut states);
-        let per_point = self.ports.outputs();
-        let mut matrix = DMatrix::zeros(self.mesh.points() * per_point, columns);
+        let per_point = self.output.nrows();
+        let mut matrix = DMatrix::zeros(self.points() * per_point, columns);
+        let mut first_row = 0;
         for (index, part) in self.parts.iter().enumerate() {
             strike(&mut states, index);
-            let first_row = self.mesh.point(index, 0) * per_point;
             matrix
                 .rows_mut(first_row, per_point)
-                .gemm(1.0, &self.ports.output, &states, 0.0);
-            for (node, (e, w)) in part.outputs.iter().enumerate() {
-                let first_row = self.mesh.point(index, node + 1) * per_point;
-                let mut rows = matrix.rows_mut(first_row, per_point);
-                rows.gemm(1.0, e, &states, 0.0);
-                if let Some(first) = first_column[index] {
-                    let mut own = rows.columns_mut(first, w.ncols());
-                    own += w;
-                }
+                .gemm(1.0, &self.output, &states, 0.0);
+            first_row += per_point;
+            for (e, w) in &part.outputs {
+                // Views of some rows only: their columns are apart.
+                let mut rows = e * &states;
+                add(&mut rows.as_view_mut(), w, index);
+                matrix.rows_mut(first_row, per_point).copy_from(&rows);
+                first_row += per_point;
             }
             advance(&mut states, index);
         }

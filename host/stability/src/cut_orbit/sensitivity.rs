@@ -3,7 +3,6 @@
 use super::jumps::JumpSize;
 use super::model::{CutModel, Ports};
 use super::motion::Motion;
-use super::newton::Change;
 use super::orbit::CutOrbit;
 use super::period::Period;
 use super::response::Response;
@@ -47,7 +46,7 @@ impl CutOrbit {
         let by_outputs = slope(&plus.outputs, &minus.outputs);
         let inputs = slope(&plus.inputs, &minus.inputs);
         let events: Vec<f64> = slope(&plus.events, &minus.events).iter().map(|g| -g).collect();
-        let change = self.changed(&inputs, &events)?;
+        let change = self.linearized.changed(&self.mesh, &inputs, &events)?;
         let by_motion = self.linearized.cutting_n(change.outputs.as_slice());
         let explicit = plus.cutting_n.iter().zip(&minus.cutting_n);
         let cutting_n = explicit.zip(&by_motion).map(|((plus, minus), by_motion)| {
@@ -68,27 +67,6 @@ impl CutOrbit {
                 .map(|(jump, delay_s)| self.impulse(jump, *delay_s))
                 .collect(),
         })
-    }
-
-    /// First-order change of the orbit under further inputs at all nodes, and further values of the event functions.
-    fn changed(&self, inputs: &[f64], events: &[f64]) -> Option<Change> {
-        let (mesh, ports) = (&self.mesh, &self.ports);
-        // A further force may act where none acts on the orbit.
-        let Some(undriven) = self.linearized.undriven(mesh, ports, inputs) else {
-            return self.linearized.solve(mesh, ports, inputs, events);
-        };
-        let moved = Response::new(mesh, ports)?.outputs(&undriven);
-        let (by_inputs, by_events) = self.linearized.applied(mesh, ports, &moved);
-        let inputs: Vec<f64> = inputs.iter().zip(by_inputs).map(|(own, by)| own + by).collect();
-        let events: Vec<f64> = events.iter().zip(by_events).map(|(own, by)| own - by).collect();
-        let mut change = self.linearized.solve(mesh, ports, &inputs, &events)?;
-        for (sum, own) in change.inputs.iter_mut().zip(undriven) {
-            *sum += own;
-        }
-        for (sum, own) in change.outputs.iter_mut().zip(moved) {
-            *sum += own;
-        }
-        Some(change)
     }
 
     fn impulse(&self, jump: &JumpSize, delay_s: f64) -> (f64, [f64; 3], Vec<f64>) {
