@@ -83,10 +83,10 @@ impl Period<'_> {
         let whole: Vec<f64> = rest.row_iter().map(|row| row.norm()).collect();
         let mut basis: Vec<DVector<f64>> = Vec::new();
         let mut rows = Vec::new();
-        for index in 0..inputs {
+        for (index, whole) in whole.iter().enumerate() {
             let row = rest.row(index).clone_owned();
             let square = row.norm_squared();
-            if square.sqrt() <= DEPENDENT * whole[index] || square == 0.0 {
+            if square.sqrt() <= DEPENDENT * whole || square == 0.0 {
                 continue;
             }
             let shares = &rest * row.transpose() / square;
