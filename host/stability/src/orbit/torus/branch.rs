@@ -74,7 +74,7 @@ pub enum TorusEnd {
     Range,
     /// The torus has shrunk to a forced orbit again.
     Rejoins,
-    /// The torus is no longer smooth enough for [`HARMONICS_MAX`] harmonics: the vibration is about to lock to a rational
+    /// The torus is no longer smooth enough for the largest number of harmonics: the vibration is about to lock to a rational
     /// rotation, or the torus breaks.
     Breaks,
     /// No torus is found further with the shortest step.
