@@ -24,7 +24,8 @@ fn options(verb: &str) -> Vec<String> {
 
 #[test]
 fn every_verb_answers_with_json() {
-    for verb in verbs() {
+    // A script for a shell is no answer.
+    for verb in verbs().into_iter().filter(|verb| verb != "completions") {
         assert!(
             options(&verb).iter().any(|option| option.starts_with("--json ")),
             "{verb} has no --json"
