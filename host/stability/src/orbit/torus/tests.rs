@@ -236,30 +236,3 @@ fn tori_are_refused_where_they_are_not_covered() {
     let refused = follow_torus(&problem, setting, [0.0, 3.0], &branch.events[0]).unwrap_err();
     assert!(refused.to_string().contains("torus"), "{refused}");
 }
-
-#[test]
-#[ignore = "exploration"]
-fn explore() {
-    let problem = ForcedProblem::new(&robot()).unwrap();
-    for tau in [6.0, 6.4, 6.6, 6.1] {
-        let event = first_loss(&problem, tau);
-        println!("τ {tau}: loss w {:.6} {:?}", event.value * W_PER_MM, event.kind);
-        let found = follow_torus(
-            &problem,
-            problem.setting(rpm(tau), 0.0),
-            [0.0, 1.3 * event.value],
-            &event,
-        );
-        match found {
-            Ok(branch) => {
-                shown(&branch);
-                println!(
-                    "folds {:?} bistable {:?}",
-                    branch.folds_mm(),
-                    branch.bistable_mm()
-                );
-            }
-            Err(e) => println!("  {e}"),
-        }
-    }
-}
