@@ -285,7 +285,11 @@ impl Range {
         let speeds_rpm = speeds(case, cuts.tried, &cuts.recorded_rpm, count)?;
         let below_cuts_mm = BELOW_CUTS * cuts.all().map(|cut| cut.depth_mm).fold(0.0, f64::max);
         let searched_mm = if cuts.tried.is_empty() {
-            let first_mm = if is_costly { below_cuts_mm } else { 0.0 };
+            let first_mm = if is_costly {
+                below_cuts_mm.max(SHALLOWEST_MM)
+            } else {
+                SHALLOWEST_MM
+            };
             depth_mm(method, &speeds_rpm, first_mm)?.max(below_cuts_mm)
         } else {
             below_cuts_mm
@@ -418,12 +422,11 @@ fn speeds(
 }
 
 /// Largest axial depth of a stability chart, mm: [`DEPTH`] times the lowest stability limit over at most [`COARSE`] of
-/// the speeds, which is searched by doubling the depth from `first_mm` or, if that is 0, from [`SHALLOWEST_MM`];
-/// [`DEEPEST_MM`] if no limit is found.
+/// the speeds, which is searched by doubling the depth from `first_mm`; [`DEEPEST_MM`] if no limit is found.
 fn depth_mm(method: &dyn Method, speeds_rpm: &[f64], first_mm: f64) -> Result<f64, StabilityError> {
     let every = speeds_rpm.len().div_ceil(COARSE).max(1);
     let coarse: Vec<f64> = speeds_rpm.iter().copied().step_by(every).collect();
-    let mut depth_mm = if first_mm > 0.0 { first_mm } else { SHALLOWEST_MM };
+    let mut depth_mm = first_mm;
     while depth_mm < DEEPEST_MM {
         let lines = first_limits(method, &coarse, depth_mm)?;
         let limits = lines.iter().filter_map(|line| line.first_limit);

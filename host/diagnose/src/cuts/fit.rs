@@ -234,14 +234,35 @@ fn stacked(states: &[State]) -> DVector<f64> {
     DVector::from_vec(all)
 }
 
-/// Sum of squares at a point of `space`, near an earlier fit of a part of it; `None` if no orbit exists there.
-pub(crate) fn cost_at(space: &Space<'_>, records: &[ReducedCut], z: &[f64], near: &Fit) -> Option<f64> {
-    let states = states(space, z, records, Some(&near.states))?;
-    Some(stacked(&states).norm_squared() + z.iter().map(|z| z * z).sum::<f64>())
+/// A point of a space at which a fit begins, with its orbits.
+pub(crate) struct Start {
+    z: Vec<f64>,
+    states: Vec<State>,
 }
 
-/// Fits the variables of `space` to the records, from `start`; `near` is an earlier fit, of a part of the space. `None`
-/// if no orbit exists at the start.
+impl Start {
+    /// A point of `space`; `near` is an earlier fit, of a part of the space. `None` if no orbit exists there.
+    pub(crate) fn new(
+        space: &Space<'_>,
+        records: &[ReducedCut],
+        z: Vec<f64>,
+        near: Option<&Fit>,
+    ) -> Option<Self> {
+        let states = states(space, &z, records, near.map(|near| near.states.as_slice()))?;
+        Some(Self { z, states })
+    }
+
+    /// Sum of squares that a fit minimizes.
+    pub(crate) fn cost(&self) -> f64 {
+        cost(&self.z, &self.states)
+    }
+}
+
+fn cost(z: &[f64], states: &[State]) -> f64 {
+    stacked(states).norm_squared() + z.iter().map(|z| z * z).sum::<f64>()
+}
+
+/// Fits the variables of `space` to the records, from `start`; `near` is an earlier fit, of a part of the space.
 ///
 /// Derivatives by what is uncertain of the baseline hardly change, and most of the computing time is theirs: they are
 /// those of the earlier fit and of earlier steps, until a step gains less than they promise, and at the end. A fit that
@@ -250,12 +271,14 @@ pub(crate) fn cost_at(space: &Space<'_>, records: &[ReducedCut], z: &[f64], near
 pub(crate) fn fit(
     space: &Space<'_>,
     records: &[ReducedCut],
-    start: Vec<f64>,
+    start: Start,
     near: Option<&Fit>,
     useful: f64,
-) -> Option<Fit> {
-    let mut z = start;
-    let mut current = states(space, &z, records, near.map(|near| near.states.as_slice()))?;
+) -> Fit {
+    let Start {
+        mut z,
+        states: mut current,
+    } = start;
     let mut damping = 1e-6;
     let rows = records
         .iter()
@@ -302,9 +325,9 @@ pub(crate) fn fit(
             continue;
         }
         let next = states(space, &moved, records, Some(&current));
-        let new_cost = next.as_ref().map_or(f64::INFINITY, |next| {
-            stacked(next).norm_squared() + moved.iter().map(|z| z * z).sum::<f64>()
-        });
+        let new_cost = next
+            .as_ref()
+            .map_or(f64::INFINITY, |next| self::cost(&moved, next));
         tracing::trace!(
             cost,
             predicted,
@@ -339,7 +362,7 @@ pub(crate) fn fit(
     for index in 0..information.nrows() {
         information[(index, index)] += 1.0;
     }
-    Some(Fit {
+    Fit {
         left: residual.norm_squared(),
         prior: z.iter().map(|z| z * z).sum(),
         z,
@@ -347,7 +370,7 @@ pub(crate) fn fit(
         jacobian: slopes,
         residual,
         states: current,
-    })
+    }
 }
 
 /// A damped step within the bounds, and the decrease of the cost that it predicts.

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::candidate::Candidate;
 use super::candidates;
-use super::fit::{Fit, REACH, cost_at, fit};
+use super::fit::{Fit, REACH, Start, fit};
 use super::record::ReducedCut;
 use super::space::Space;
 use crate::baseline::Baseline;
@@ -47,8 +47,7 @@ pub(crate) struct Explanations<'a> {
 /// Explains the records by ever larger sets of effects, as long as a further one gains.
 pub(crate) fn explain<'a>(baseline: &'a Baseline<'a>, records: &[ReducedCut]) -> Option<Explanations<'a>> {
     let space = Space::new(baseline, records);
-    let start = vec![0.0; space.variables.len()];
-    let fitted = fit(&space, records, start, None, f64::INFINITY)?;
+    let fitted = from_zero(&space, records)?;
     let all = candidates::all(baseline, records, &fitted);
     let written = baseline
         .case
@@ -95,13 +94,18 @@ pub(crate) fn as_written<'a>(baseline: &'a Baseline<'a>, records: &[ReducedCut])
         true => space.as_written(),
         false => space,
     };
-    let start = vec![0.0; space.variables.len()];
-    let fit = fit(&space, records, start, None, f64::INFINITY)?;
+    let fit = from_zero(&space, records)?;
     Some(Explanation {
         evidence: fit.evidence(),
         space,
         fit,
     })
+}
+
+/// The fit of a space from the baseline as it is; `None` if that has no orbit.
+fn from_zero(space: &Space<'_>, records: &[ReducedCut]) -> Option<Fit> {
+    let start = Start::new(space, records, vec![0.0; space.variables.len()], None)?;
+    Some(fit(space, records, start, None, f64::INFINITY))
 }
 
 /// The best set without one of its effects, if that effect does not gain beside the others: a later effect may have taken
@@ -113,7 +117,8 @@ fn reduced<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut]
     let prior = priors(all);
     let without = |number: usize| {
         let (space, start) = best.space.without(number, &best.fit.z);
-        let fitted = fit(&space, records, start, Some(&best.fit), f64::INFINITY)?;
+        let start = Start::new(&space, records, start, Some(&best.fit))?;
+        let fitted = fit(&space, records, start, Some(&best.fit), f64::INFINITY);
         let known: f64 = space
             .candidates
             .iter()
@@ -199,7 +204,7 @@ fn extended<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut
         let count = if useful.is_finite() { 1 } else { 2 };
         let found = nearest_starts(best, &space, records, starts, count)
             .into_iter()
-            .filter_map(|start| fit(&space, records, start, Some(&best.fit), useful))
+            .map(|start| fit(&space, records, start, Some(&best.fit), useful))
             .max_by(|a, b| a.evidence().total_cmp(&b.evidence()));
         tracing::debug!(
             gain = found.as_ref().map(|found| found.evidence() - best.fit.evidence() + prior[index]),
@@ -247,15 +252,15 @@ fn nearest_starts(
     records: &[ReducedCut],
     mut starts: Vec<Scored>,
     count: usize,
-) -> Vec<Vec<f64>> {
+) -> Vec<Start> {
     starts.truncate(COMPARED);
-    let mut compared: Vec<(f64, Vec<f64>)> = starts
+    let mut compared: Vec<(f64, Start)> = starts
         .par_iter()
         .filter_map(|scored| nearest_start(best, space, records, scored))
         .collect();
     compared.sort_by(|a, b| a.0.total_cmp(&b.0));
     compared.truncate(count);
-    compared.into_iter().map(|(_, z)| z).collect()
+    compared.into_iter().map(|(_, start)| start).collect()
 }
 
 /// The start of a fit, with its sum of squares. Where derivatives reach too far, the records agree less than without the
@@ -265,20 +270,21 @@ fn nearest_start(
     space: &Space<'_>,
     records: &[ReducedCut],
     scored: &Scored,
-) -> Option<(f64, Vec<f64>)> {
+) -> Option<(f64, Start)> {
     let at = |halvings: i32| -> Vec<f64> {
         let share = 0.5_f64.powi(halvings);
         let near = scored.at.iter().zip(&scored.start);
         let start = near.map(|(at, start)| at + share * (start - at));
         best.fit.z.iter().copied().chain(start).collect()
     };
-    let mut nearest: Option<(f64, Vec<f64>)> = None;
+    let mut nearest: Option<(f64, Start)> = None;
     for z in (0..NEARER_STARTS).map(at) {
-        let Some(cost) = cost_at(space, records, &z, &best.fit) else {
+        let Some(start) = Start::new(space, records, z, Some(&best.fit)) else {
             continue;
         };
+        let cost = start.cost();
         if nearest.as_ref().is_none_or(|(least, _)| cost < *least) {
-            nearest = Some((cost, z));
+            nearest = Some((cost, start));
         }
         if cost < best.fit.cost() {
             break;

@@ -241,8 +241,8 @@ impl Linearization {
         }
         let right = right.column(0);
         let mut inputs = Vec::new();
+        let per_subinterval = self.response.inputs_of_subinterval();
         for driven in &self.driven {
-            let per_subinterval = self.response.inputs_of_subinterval();
             match driven {
                 Some(Driven { first_column, basis }) => {
                     inputs.extend((basis * right.rows(*first_column, basis.ncols())).iter());

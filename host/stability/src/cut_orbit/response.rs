@@ -15,9 +15,10 @@ use super::propagator::SubintervalResponse;
 pub(super) struct Response {
     nodes: usize,
     inputs: usize,
-    /// Input and output matrix of the structure.
+    /// Number of outputs at a point.
+    outputs: usize,
+    /// Input matrix of the structure.
     b: DMatrix<f64>,
-    output: DMatrix<f64>,
     parts: Vec<Arc<Part>>,
     /// Factors of I − Φ, with the map Φ of the states over the revolution.
     closure: LU<f64, Dyn, Dyn>,
@@ -25,22 +26,31 @@ pub(super) struct Response {
 
 struct Part {
     states: SubintervalResponse,
-    /// Outputs at the nodes: C E and C W + D.
-    outputs: Vec<(DMatrix<f64>, DMatrix<f64>)>,
+    /// Outputs at the start and the nodes, point by point: C and 0, C E and C W + D.
+    outputs: (DMatrix<f64>, DMatrix<f64>),
 }
 
 impl Part {
     fn new(ports: &Ports, mesh: &Mesh, duration_s: f64) -> Self {
         let states = SubintervalResponse::new(&ports.a, &ports.b, mesh.gauss, duration_s);
-        let inputs = ports.inputs();
-        let outputs = states.at_nodes.iter().enumerate().map(|(node, (e, w))| {
-            let mut by_inputs = &ports.output * w;
-            let mut own = by_inputs.columns_mut(node * inputs, inputs);
+        let (inputs, count) = (ports.inputs(), ports.outputs());
+        let points = mesh.nodes() + 1;
+        let mut by_states = DMatrix::zeros(points * count, ports.a.nrows());
+        let mut by_inputs = DMatrix::zeros(points * count, mesh.nodes() * inputs);
+        by_states.rows_mut(0, count).copy_from(&ports.output);
+        for (node, (e, w)) in states.at_nodes.iter().enumerate() {
+            let first_row = (node + 1) * count;
+            by_states
+                .rows_mut(first_row, count)
+                .copy_from(&(&ports.output * e));
+            by_inputs
+                .rows_mut(first_row, count)
+                .copy_from(&(&ports.output * w));
+            let mut own = by_inputs.view_mut((first_row, node * inputs), (count, inputs));
             own += &ports.direct;
-            (&ports.output * e, by_inputs)
-        });
+        }
         Self {
-            outputs: outputs.collect(),
+            outputs: (by_states, by_inputs),
             states,
         }
     }
@@ -80,8 +90,8 @@ impl Response {
         is_regular.iter().all(|x| x.is_finite()).then(|| Self {
             nodes: mesh.nodes(),
             inputs: ports.inputs(),
+            outputs: ports.outputs(),
             b: ports.b.clone(),
-            output: ports.output.clone(),
             parts,
             closure,
         })
@@ -102,27 +112,23 @@ impl Response {
         }
         // The closure was seen to be regular.
         state = self.closure.solve(&state).unwrap_or(state);
-        let mut outputs = Vec::with_capacity(self.points() * self.output.nrows());
+        let rows = (self.nodes + 1) * self.outputs;
+        let mut outputs = DVector::zeros(self.parts.len() * rows);
         for (index, part) in self.parts.iter().enumerate() {
             let forces = columns(index);
-            outputs.extend((&self.output * &state).iter());
-            for (e, w) in &part.outputs {
-                outputs.extend((e * &state + w * &forces).iter());
-            }
+            let (by_states, by_inputs) = &part.outputs;
+            let mut own = outputs.rows_mut(index * rows, rows);
+            own.gemv(1.0, by_states, &state, 0.0);
+            own.gemv(1.0, by_inputs, &forces, 1.0);
             let (e, w) = &part.states.at_end;
             state = e * state + w * forces;
         }
-        outputs
+        outputs.data.into()
     }
 
     /// Number of inputs at the nodes of a subinterval.
     pub(super) fn inputs_of_subinterval(&self) -> usize {
         self.nodes * self.inputs
-    }
-
-    /// Number of points: the start and the nodes of every subinterval.
-    fn points(&self) -> usize {
-        self.parts.len() * (self.nodes + 1)
     }
 
     /// Matrix from unknowns to outputs, (points · outputs) × unknowns. `driven` says what the unknowns of each subinterval
@@ -135,16 +141,13 @@ impl Response {
         impulses: &[(usize, DVector<f64>)],
     ) -> DMatrix<f64> {
         let columns = count + impulses.len();
-        let add = |rows: &mut nalgebra::DMatrixViewMut<'_, f64>, by_inputs: &DMatrix<f64>, index: usize| {
-            if let Some(Driven { first_column, basis }) = &driven[index] {
-                rows.columns_mut(*first_column, basis.ncols())
-                    .gemm(1.0, by_inputs, basis, 1.0);
-            }
-        };
         let advance = |states: &mut DMatrix<f64>, index: usize| {
             let (e, w) = &self.parts[index].states.at_end;
             let mut next = e * &*states;
-            add(&mut next.as_view_mut(), w, index);
+            if let Some(Driven { first_column, basis }) = &driven[index] {
+                next.columns_mut(*first_column, basis.ncols())
+                    .gemm(1.0, w, basis, 1.0);
+            }
             *states = next;
         };
         let strike = |states: &mut DMatrix<f64>, index: usize| {
@@ -161,21 +164,16 @@ impl Response {
             advance(&mut states, index);
         }
         self.closure.solve_mut(&mut states);
-        let per_point = self.output.nrows();
-        let mut matrix = DMatrix::zeros(self.points() * per_point, columns);
-        let mut first_row = 0;
+        let rows = (self.nodes + 1) * self.outputs;
+        let mut matrix = DMatrix::zeros(self.parts.len() * rows, columns);
         for (index, part) in self.parts.iter().enumerate() {
             strike(&mut states, index);
-            matrix
-                .rows_mut(first_row, per_point)
-                .gemm(1.0, &self.output, &states, 0.0);
-            first_row += per_point;
-            for (e, w) in &part.outputs {
-                // Views of some rows only: their columns are apart.
-                let mut rows = e * &states;
-                add(&mut rows.as_view_mut(), w, index);
-                matrix.rows_mut(first_row, per_point).copy_from(&rows);
-                first_row += per_point;
+            let (by_states, by_inputs) = &part.outputs;
+            let mut own = matrix.rows_mut(index * rows, rows);
+            own.gemm(1.0, by_states, &states, 0.0);
+            if let Some(Driven { first_column, basis }) = &driven[index] {
+                own.columns_mut(*first_column, basis.ncols())
+                    .gemm(1.0, by_inputs, basis, 1.0);
             }
             advance(&mut states, index);
         }

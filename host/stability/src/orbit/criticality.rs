@@ -33,14 +33,11 @@ use super::forced::ForcedProblem;
 use super::parameter::{Parameter, Setting};
 use super::tooth_period::{SUBINTERVAL_ANGLE, Subinterval, ToothPeriod, jacobians};
 use crate::spectrum::stability_loss::StabilityLoss;
+use quietcut_numerics::eigenvalues::eigenvector;
 
 /// Distance of μ^q from 1, for q = 1, 2, 3 and 4, below which a torus is in strong resonance, and the normal form is
 /// another one. A choice: nearer, the coefficients grow beyond their range of validity.
 const RESONANT: f64 = 1e-3;
-
-/// Steps of the inverse iteration for a null vector. A choice: each reduces the other components by the ratio of the smallest
-/// to the next singular value, 1e-9.
-const INVERSE_ITERATIONS: usize = 4;
 
 /// Whether the vibration that begins at a torus or flip is stable.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -170,8 +167,10 @@ impl ModeSystem<'_> {
     fn coefficient(&self, mu: Complex64, is_flip: bool) -> Option<Criticality> {
         let order = self.order();
         let (_, transition) = self.advance(mu, &DMatrix::identity(order, order), None)?;
-        let singular = &transition - DMatrix::from_diagonal_element(order, order, mu);
-        let (start, left) = (null_vector(&singular)?, null_vector(&singular.adjoint())?);
+        // By inverse iteration: where the criticality changes, the coefficient is the difference of two large terms, and the
+        // singular value decomposition of nalgebra errs by up to a percent in these vectors.
+        let start = eigenvector(&transition, mu)?;
+        let left = eigenvector(&transition.adjoint(), mu.conj())?;
         let (q, _) = self.from(mu, &start, None)?;
         let conjugate = map(&q, |value| value.conjugate());
         let one = Complex64::from(1.0);
@@ -336,22 +335,6 @@ impl ModeSystem<'_> {
         }
         form
     }
-}
-
-/// Unit null vector of a matrix that is singular up to the error of the multiplier, by inverse iteration.
-///
-/// A singular value decomposition is not used: that of nalgebra errs by up to a percent in these vectors, and where the
-/// criticality changes, the coefficient is the difference of two large terms.
-fn null_vector(matrix: &DMatrix<Complex64>) -> Option<DVector<Complex64>> {
-    let size = matrix.nrows();
-    // Keeps the matrix regular where rounding makes it exactly singular.
-    let shift = DMatrix::from_diagonal_element(size, size, Complex64::from(f64::EPSILON * matrix.norm()));
-    let lu = (matrix + shift).lu();
-    let mut vector = DVector::from_element(size, Complex64::from(1.0));
-    for _ in 0..INVERSE_ITERATIONS {
-        vector = lu.solve(&vector)?.normalize();
-    }
-    Some(vector)
 }
 
 fn map(values: &Values, of: impl Fn(&DVector<Complex64>) -> DVector<Complex64>) -> Values {

@@ -136,32 +136,3 @@ fn other_events_are_refused() {
         OrbitError::NotCovered { .. }
     ));
 }
-
-#[test]
-#[ignore = "exploration"]
-fn explore_normal_form() {
-    let problem = hardening();
-    let range = [0.0, 3.0];
-    for rpm in [1930.0, 1950.0, 1965.0, 1975.0, 1980.0, 1985.0, 1995.0, 2010.0] {
-        let setting = problem.setting(rpm, 0.0);
-        let (branch, doubled) = doubled_of(&problem, setting, Parameter::Depth, range);
-        let flip = &branch.events[0];
-        let found = criticality(&problem, setting, Parameter::Depth, range, flip).unwrap();
-        println!(
-            "{rpm}: flip {} error {} coefficient {}",
-            flip.value, flip.error, found.coefficient
-        );
-        for (index, at) in doubled.branch.points.iter().enumerate().take(14) {
-            let up_to = [0.0, at.value];
-            let forced = follow(&problem, setting, Parameter::Depth, up_to, Extent::Whole).unwrap();
-            let excess = forced.points.last().unwrap().multiplier_abs - 1.0;
-            let z = doubling_mm(&doubled, index) / found.mode_mm[0];
-            println!(
-                "   {:.3e} excess {excess:.4e} z {z:.4e} c {:.6e} chip {}",
-                at.value / flip.value - 1.0,
-                -excess / (z * z),
-                doubled.points[index].smallest_chip_mm
-            );
-        }
-    }
-}

@@ -74,22 +74,16 @@ impl Steps {
         structure: &FirstOrder,
         start: &DMatrix<f64>,
     ) -> [[f64; 3]; 2] {
-        let none = DMatrix::zeros(start.len(), 2);
+        // No derivative is needed but those by the rotation and the depth, which every motion has.
+        let mut here = Integrated::from(start, DMatrix::zeros(start.len(), 2));
         let by_rates = &structure.c * &structure.a;
-        let mut states = start.clone();
         let mut squares = [[0.0; 3]; 2];
         let mut turn = 0.0;
         for step in &self.steps {
-            let h = step.turn * self.seconds_per_radian;
-            let at = |share: f64, rates: Option<&DMatrix<f64>>| {
-                let moved = rates.map_or_else(|| states.clone(), |rates| &states + rates * (share * h));
-                motion
-                    .rates(&moved, &none, step.teeth, step.phase + share * step.turn)
-                    .rates
-            };
-            let first = at(0.0, None);
+            let displacement = &structure.c * &here.end;
+            let first = self.advance(motion, &mut here, step);
             // Without regard to kinks of the force u̇ = C A x and ü = C A ẋ: a force does not make the velocity jump.
-            for (quantity, values) in [&structure.c * &states, &by_rates * &first].iter().enumerate() {
+            for (quantity, values) in [displacement, &by_rates * first.rates].iter().enumerate() {
                 let mean = values.column_mean();
                 for axis in 0..3 {
                     let row = values.row(axis);
@@ -98,43 +92,50 @@ impl Steps {
                 }
             }
             turn += step.turn;
-            let second = at(0.5, Some(&first));
-            let third = at(0.5, Some(&second));
-            let last = at(1.0, Some(&third));
-            states += (first + (second + third) * 2.0 + last) * (h / 6.0);
         }
         squares.map(|of_quantity| of_quantity.map(|square| (square / turn).sqrt()))
     }
 
     /// Integrates from states at the start of the period.
     pub(super) fn integrate(&self, motion: &Motion<'_>, start: &DMatrix<f64>) -> Integrated {
-        let size = start.len();
-        let mut here = Integrated {
-            end: start.clone(),
-            by: DMatrix::identity(size, motion.unknowns()),
-            smallest_chip_m: f64::INFINITY,
-        };
+        let mut here = Integrated::from(start, DMatrix::identity(start.len(), motion.unknowns()));
         for step in &self.steps {
-            let h = step.turn * self.seconds_per_radian;
-            let at = |share: f64, from: Option<&Rates>| {
-                let moved = |base: &DMatrix<f64>, rates: Option<&DMatrix<f64>>| match rates {
-                    Some(rates) => base + rates * (share * h),
-                    None => base.clone(),
-                };
-                let states = moved(&here.end, from.map(|rates| &rates.rates));
-                let by = moved(&here.by, from.map(|rates| &rates.by));
-                motion.rates(&states, &by, step.teeth, step.phase + share * step.turn)
-            };
-            let first = at(0.0, None);
-            let second = at(0.5, Some(&first));
-            let third = at(0.5, Some(&second));
-            let last = at(1.0, Some(&third));
-            for (weight, stage) in [(1.0, first), (2.0, second), (2.0, third), (1.0, last)] {
-                here.end += &stage.rates * (weight * h / 6.0);
-                here.by += &stage.by * (weight * h / 6.0);
-                here.smallest_chip_m = here.smallest_chip_m.min(stage.smallest_chip_m);
-            }
+            self.advance(motion, &mut here, step);
         }
         here
+    }
+
+    /// Advances by one step, and returns the rates at its start.
+    fn advance(&self, motion: &Motion<'_>, here: &mut Integrated, step: &Step) -> Rates {
+        let h = step.turn * self.seconds_per_radian;
+        let at = |share: f64, from: Option<&Rates>| {
+            let moved = |base: &DMatrix<f64>, rates: Option<&DMatrix<f64>>| match rates {
+                Some(rates) => base + rates * (share * h),
+                None => base.clone(),
+            };
+            let states = moved(&here.end, from.map(|rates| &rates.rates));
+            let by = moved(&here.by, from.map(|rates| &rates.by));
+            motion.rates(&states, &by, step.teeth, step.phase + share * step.turn)
+        };
+        let first = at(0.0, None);
+        let second = at(0.5, Some(&first));
+        let third = at(0.5, Some(&second));
+        let last = at(1.0, Some(&third));
+        for (weight, stage) in [(1.0, &first), (2.0, &second), (2.0, &third), (1.0, &last)] {
+            here.end += &stage.rates * (weight * h / 6.0);
+            here.by += &stage.by * (weight * h / 6.0);
+            here.smallest_chip_m = here.smallest_chip_m.min(stage.smallest_chip_m);
+        }
+        first
+    }
+}
+
+impl Integrated {
+    fn from(start: &DMatrix<f64>, by: DMatrix<f64>) -> Self {
+        Self {
+            end: start.clone(),
+            by,
+            smallest_chip_m: f64::INFINITY,
+        }
     }
 }

@@ -5,6 +5,7 @@ use num_complex::Complex64;
 
 use super::corrector::{Corrected, Corrector, Torus};
 use crate::orbit::branch::Event;
+use quietcut_numerics::eigenvalues::eigenvector;
 
 /// Sizes of the first torus, in the unit of the state, of which the first is used from which Newton's method finds one. A
 /// choice: larger ones are less well predicted, nearer to the bifurcation the equations are nearly singular.
@@ -31,9 +32,7 @@ fn mode(corrector: &Corrector<'_>, flat: &Torus) -> Option<DVector<Complex64>> {
         let block = by.view((row * order, column * order), (order, order));
         first += block.map(|entry| factor * entry);
     }
-    let factors = first.svd(false, true);
-    let smallest = factors.singular_values.imin();
-    Some(factors.v_t?.row(smallest).adjoint())
+    eigenvector(&first, Complex64::ZERO)
 }
 
 /// The torus nearest to a bifurcation, with the tangent that leads away from it. `None` if none is found.
